@@ -12,10 +12,12 @@ pub mod mesh;
 pub mod mesh_io;
 pub mod ply;
 pub mod pose;
+pub mod progress;
 pub mod tree;
 
 pub use camera::Camera;
 pub use gaussians::Gaussians;
 pub use mesh::TriMesh;
 pub use pose::Pose;
+pub use progress::{Cancelled, Progress};
 pub use tree::{Joint, JointKind, KinematicTree, Screw};
