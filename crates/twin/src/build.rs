@@ -1,0 +1,182 @@
+//! The stage: observations and tree in, [`Twin`] out.
+
+use crate::fuse::{self, Field};
+use crate::{Inertial, Observation, PartModel, Twin, color, hulls, mass, simplify, surface};
+use glam::{DMat3, DVec3, Vec3};
+use hingecast_geom::{Cancelled, KinematicTree, Pose, Progress, TriMesh};
+use rayon::prelude::*;
+use serde::{Deserialize, Serialize};
+
+/// How fine, how heavy. Lengths are shares of the object's diagonal so that glasses and fridges get the same care.
+#[derive(Clone, Debug, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct Config {
+    /// Voxel edge / diagonal. 1/256 is about half a pixel of a 256² picture that the object fills.
+    pub voxel: f64,
+    /// kg/m^3 of the solid; the default is light wood and hollow plastic.
+    pub density: f64,
+    /// Faces of the visual mesh of one part.
+    pub max_faces: usize,
+    /// Simplification may move the surface by this share of the diagonal.
+    pub simplify_error: f64,
+    /// Convex pieces of one part.
+    pub max_hulls: u32,
+    /// Pieces of surface smaller than this share of the part's largest piece are dropped.
+    pub crumbs: f64,
+    /// At most this many images colour the vertices.
+    pub color_views: usize,
+}
+
+impl Default for Config {
+    fn default() -> Self {
+        Self {
+            voxel: 1.0 / 256.0,
+            density: 500.0,
+            max_faces: 20_000,
+            simplify_error: 5e-4,
+            max_hulls: 48,
+            crumbs: 0.02,
+            color_views: 160,
+        }
+    }
+}
+
+/// What `build` reads besides the observations.
+pub struct Input<'a> {
+    pub name: &'a str,
+    pub tree: &'a KinematicTree,
+    /// Number of observations; `load(i)` is called up to three times for each.
+    pub n_observations: usize,
+    /// Diagonal of the object's box in the first state, scene units.
+    pub diagonal: f64,
+    pub metric: bool,
+    pub up: DVec3,
+}
+
+/// Fuses, meshes, colours, decomposes and weighs every part.
+///
+/// # Errors
+/// What `load` answers, or [`Cancelled`].
+pub fn build<E: From<Cancelled> + Send>(
+    input: &Input,
+    load: &(dyn Fn(usize) -> Result<Observation, E> + Sync),
+    config: &Config,
+    progress: &Progress,
+) -> Result<Twin, E> {
+    let tree = input.tree;
+    let n_states = tree.joints.iter().map(|j| j.values.len()).max().unwrap_or(1).max(1);
+    let poses: Vec<Vec<Pose>> = (0..n_states)
+        .map(|s| if tree.joints.is_empty() { vec![Pose::IDENTITY; tree.parts.len()] } else { tree.poses_at(s) })
+        .collect();
+    let voxel = (config.voxel * input.diagonal) as f32;
+    let volumes = fuse::fuse(input.n_observations, load, &poses, voxel, progress)?;
+
+    // Leaves first: what a drawer fills is not the cabinet's, where no ray can tell.
+    let mut order: Vec<usize> = (0..tree.parts.len()).collect();
+    order.sort_by_key(|&p| std::cmp::Reverse(depth_of(tree, p)));
+    let mut fields: Vec<Option<Field>> = (0..tree.parts.len()).map(|_| None).collect();
+    for &part in &order {
+        let Some(volume) = &volumes[part] else { continue };
+        let relative: Vec<(usize, Vec<Pose>)> = (0..fields.len())
+            .filter(|&q| fields[q].is_some())
+            .map(|q| (q, poses.iter().map(|at| at[q].inverse() * at[part]).collect()))
+            .collect();
+        let taken = |x: Vec3| {
+            relative.iter().any(|(q, q_from_part)| {
+                let field = fields[*q].as_ref().expect("filtered");
+                q_from_part.iter().any(|pose| field.at(pose.apply(x.as_dvec3()).as_vec3()) < 0.0)
+            })
+        };
+        let field = volume.field(&taken);
+        fields[part] = Some(field);
+    }
+    progress.check()?;
+
+    let mut doubts = Vec::new();
+    let mut meshes: Vec<TriMesh> = fields
+        .par_iter()
+        .map(|field| {
+            let Some(field) = field else { return TriMesh::default() };
+            let fine = surface::drop_crumbs(&surface::extract(field), config.crumbs);
+            simplify::simplify(&fine, config.max_faces, (config.simplify_error * input.diagonal) as f32)
+        })
+        .collect();
+    drop(fields);
+    colour(&mut meshes, input, load, &poses, config, voxel, progress)?;
+
+    let hull_config = hulls::HullConfig { max_hulls: config.max_hulls, ..Default::default() };
+    let decomposed: Vec<(Vec<TriMesh>, usize)> =
+        meshes.par_iter().map(|mesh| hulls::decompose(mesh, &hull_config)).collect();
+    let mut parts = Vec::new();
+    for (part, (mesh, (hulls, dropped))) in meshes.into_iter().zip(decomposed).enumerate() {
+        let name = &tree.parts[part];
+        if mesh.is_empty() {
+            doubts.push(format!("part '{name}' has no surface: no depth pixel carries its label"));
+        } else if hulls.is_empty() {
+            doubts.push(format!("part '{name}' has no collision hull: its surface is too thin or open"));
+        } else if dropped * 4 > hulls.len() {
+            doubts.push(format!(
+                "part '{name}': {dropped} flat collision pieces of {} were dropped",
+                dropped + hulls.len()
+            ));
+        }
+        let (inertial, doubt) = if mesh.is_empty() {
+            (Inertial { mass: 1e-3, com: DVec3::ZERO, inertia: DMat3::IDENTITY * 1e-6 }, None)
+        } else {
+            mass::inertial(&mesh, &hulls, config.density)
+        };
+        if let Some(doubt) = doubt {
+            doubts.push(format!("part '{name}': {doubt}"));
+        }
+        parts.push(PartModel { name: name.clone(), mesh, hulls, inertial });
+    }
+    Ok(Twin {
+        name: input.name.to_string(),
+        tree: tree.clone(),
+        parts,
+        doubts,
+        diagonal: input.diagonal,
+        metric: input.metric,
+        up: input.up,
+    })
+}
+
+/// Joints between `part` and its root.
+fn depth_of(tree: &KinematicTree, part: usize) -> usize {
+    let (mut depth, mut at) = (0, part);
+    while let Some(joint) = tree.joint_of(at) {
+        (depth, at) = (depth + 1, joint.parent);
+        if depth > tree.parts.len() {
+            break;
+        }
+    }
+    depth
+}
+
+fn colour<E: From<Cancelled> + Send>(
+    meshes: &mut [TriMesh],
+    input: &Input,
+    load: &(dyn Fn(usize) -> Result<Observation, E> + Sync),
+    poses: &[Vec<Pose>],
+    config: &Config,
+    voxel: f32,
+    progress: &Progress,
+) -> Result<(), E> {
+    let n = input.n_observations;
+    let used = n.min(config.color_views.max(1));
+    let chosen: Vec<usize> = (0..used).map(|k| k * n / used.max(1)).collect();
+    let normals: Vec<Vec<Vec3>> = meshes.iter().map(TriMesh::vertex_normals).collect();
+    let mut sums: Vec<Vec<[f32; 4]>> = meshes.iter().map(|m| vec![[0.0; 4]; m.vertices.len()]).collect();
+    for batch in chosen.chunks(32) {
+        progress.check()?;
+        let seen = batch.par_iter().map(|&i| load(i)).collect::<Result<Vec<_>, E>>()?;
+        for (part, mesh) in meshes.iter().enumerate() {
+            let at: Vec<Pose> = seen.iter().map(|o| poses[o.state][part]).collect();
+            color::accumulate(&mut sums[part], mesh, &normals[part], part as u8, &seen, &at, 2.0 * voxel);
+        }
+    }
+    for (mesh, sums) in meshes.iter_mut().zip(&sums) {
+        color::finish(mesh, sums);
+    }
+    Ok(())
+}

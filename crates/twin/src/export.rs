@@ -1,0 +1,156 @@
+//! The twin folder: `twin.json`, `robot.urdf`, `robot.xml`, `meshes/{visual,collision}`, `splats/<part>.ply`.
+//!
+//! Link frames: axes of the canonical world; origin on the joint axis nearest the part's centre of mass
+//! (revolute), at the centre of mass (prismatic), at the world origin (root). Mesh files are in link frames.
+
+use crate::{PartModel, Twin, mjcf, urdf};
+use glam::{DVec3, Vec3};
+use hingecast_geom::ply::{PlyError, write_whole};
+use hingecast_geom::{Gaussians, Joint, Pose, TriMesh};
+use serde_json::json;
+use std::path::{Path, PathBuf};
+
+#[derive(Debug, thiserror::Error)]
+pub enum ExportError {
+    #[error(
+        "cannot write {path}: {source}\n  where: the twin folder\n  try: free some disk space, or another -o folder"
+    )]
+    Io { path: PathBuf, source: std::io::Error },
+    #[error(transparent)]
+    Ply(#[from] PlyError),
+}
+
+/// Origin of the link frame of `part`, canonical world.
+pub fn link_origin(twin: &Twin, part: usize) -> DVec3 {
+    let com = twin.parts[part].inertial.com;
+    match twin.tree.joint_of(part) {
+        None => DVec3::ZERO,
+        Some(j) if j.screw.kind.turns() => j.screw.foot(com),
+        Some(_) => com,
+    }
+}
+
+/// Viscous damping of `joint`: not observable from still states, so chosen that a free swing loses
+/// 63 % of its speed in one second. N m s/rad or N s/m.
+pub fn damping(twin: &Twin, joint: &Joint) -> f64 {
+    let i = &twin.parts[joint.child].inertial;
+    if joint.screw.kind.turns() {
+        let about_com = joint.screw.axis.dot(i.inertia * joint.screw.axis);
+        about_com + i.mass * joint.screw.distance(i.com).powi(2)
+    } else {
+        i.mass
+    }
+}
+
+/// Mean vertex colour in [0, 1], for formats without vertex colours.
+pub fn mean_color(mesh: &TriMesh) -> [f64; 3] {
+    let n = mesh.colors.len().max(1) as f64;
+    let sum = mesh.colors.iter().fold([0.0; 3], |s, c| [0, 1, 2].map(|k| s[k] + c[k] as f64));
+    if mesh.colors.is_empty() { [0.6; 3] } else { sum.map(|s| s / n / 255.0) }
+}
+
+pub(crate) fn visual_file(part: usize) -> String {
+    format!("visual/part_{part}.obj")
+}
+
+pub(crate) fn hull_file(part: usize, hull: usize) -> String {
+    format!("collision/part_{part}_{hull}.stl")
+}
+
+/// Writes the whole folder beside `dir` and renames it into place. `splats`: gaussians in the canonical world
+/// and the part of each.
+///
+/// # Errors
+/// When the disk refuses; the old folder is then still there.
+pub fn write(twin: &Twin, splats: Option<(&Gaussians, &[u8])>, dir: &Path) -> Result<(), ExportError> {
+    let staging = dir.with_extension("tmp");
+    let at = |path: &Path| {
+        let path = path.to_path_buf();
+        move |source| ExportError::Io { path, source }
+    };
+    if staging.exists() {
+        std::fs::remove_dir_all(&staging).map_err(at(&staging))?;
+    }
+    for folder in ["meshes/visual", "meshes/collision", "splats"] {
+        let folder = staging.join(folder);
+        std::fs::create_dir_all(&folder).map_err(at(&folder))?;
+    }
+    for (i, part) in twin.parts.iter().enumerate() {
+        write_part(&staging, i, part, link_origin(twin, i))?;
+        if let Some((gaussians, labels)) = splats {
+            let members: Vec<usize> = (0..gaussians.len()).filter(|&g| labels[g] as usize == i).collect();
+            let mut own = gaussians.select(&members);
+            let link_from_world = Pose::from_trans(-link_origin(twin, i));
+            (0..own.len()).for_each(|g| own.transform_one(g, &link_from_world));
+            own.write_ply(&staging.join("splats").join(format!("part_{i}.ply")))?;
+        }
+    }
+    let text = |name: &str, content: String| {
+        let path = staging.join(name);
+        write_whole(&path, content.as_bytes()).map_err(at(&path))
+    };
+    text("robot.urdf", urdf::to_string(twin))?;
+    text("robot.xml", mjcf::to_string(twin))?;
+    text("twin.json", serde_json::to_string_pretty(&summary(twin)).expect("plain data") + "\n")?;
+    if dir.exists() {
+        std::fs::remove_dir_all(dir).map_err(at(dir))?;
+    }
+    std::fs::rename(&staging, dir).map_err(at(dir))
+}
+
+fn write_part(dir: &Path, index: usize, part: &PartModel, origin: DVec3) -> Result<(), ExportError> {
+    let local = |mesh: &TriMesh| {
+        let mut mesh = mesh.clone();
+        mesh.vertices.iter_mut().for_each(|v| *v = (v.as_dvec3() - origin).as_vec3());
+        mesh
+    };
+    let meshes = dir.join("meshes");
+    let path = meshes.join(visual_file(index));
+    let visual = if part.mesh.is_empty() { placeholder() } else { local(&part.mesh) };
+    visual.write_obj(&path).map_err(|source| ExportError::Io { path: path.clone(), source })?;
+    // The same surface as PLY: the format whose vertex colours every mesh viewer shows.
+    visual.write_ply(&path.with_extension("ply"))?;
+    for (k, hull) in part.hulls.iter().enumerate() {
+        let path = meshes.join(hull_file(index, k));
+        local(hull).write_stl(&path).map_err(|source| ExportError::Io { path: path.clone(), source })?;
+    }
+    Ok(())
+}
+
+/// A millimetre cube for a part without surface: loaders refuse empty meshes.
+fn placeholder() -> TriMesh {
+    TriMesh::cuboid(Vec3::splat(-5e-4), Vec3::splat(5e-4))
+}
+
+fn summary(twin: &Twin) -> serde_json::Value {
+    let parts: Vec<_> = twin
+        .parts
+        .iter()
+        .enumerate()
+        .map(|(i, p)| {
+            let origin = link_origin(twin, i);
+            json!({
+                "name": p.name,
+                "link_origin": origin.to_array(),
+                "visual": format!("meshes/{}", visual_file(i)),
+                "collision": (0..p.hulls.len()).map(|k| format!("meshes/{}", hull_file(i, k))).collect::<Vec<_>>(),
+                "splats": format!("splats/part_{i}.ply"),
+                "mass": p.inertial.mass,
+                "faces": p.mesh.faces.len(),
+                "open_edges": p.mesh.open_edges(),
+                "volume": p.mesh.mass_integrals().volume,
+                "mean_color": mean_color(&p.mesh),
+            })
+        })
+        .collect();
+    json!({
+        "format": 1,
+        "name": twin.name,
+        "metric": twin.metric,
+        "up": twin.up.to_array(),
+        "diagonal": twin.diagonal,
+        "parts": parts,
+        "tree": twin.tree,
+        "doubts": twin.doubts,
+    })
+}

@@ -1,0 +1,96 @@
+//! MJCF text of a twin: the same links and joints as the URDF, for MuJoCo.
+
+use crate::Twin;
+use crate::export::{damping, hull_file, link_origin, mean_color, visual_file};
+use crate::urdf::{escape, xyz};
+use glam::DVec3;
+use hingecast_geom::JointKind;
+use std::fmt::Write as _;
+
+pub fn to_string(twin: &Twin) -> String {
+    let mut out = String::new();
+    let _ = writeln!(out, "<mujoco model=\"{}\">", escape(&twin.name));
+    let _ = writeln!(out, "  <compiler angle=\"radian\" meshdir=\"meshes\" autolimits=\"true\"/>");
+    let _ = writeln!(out, "  <statistic extent=\"{:.6}\"/>", twin.diagonal);
+    let _ = writeln!(out, "  <asset>");
+    for (i, part) in twin.parts.iter().enumerate() {
+        // "shell": a visual mesh need not enclose a volume; mass comes from <inertial>.
+        let _ = writeln!(out, "    <mesh name=\"visual_{i}\" file=\"{}\" inertia=\"shell\"/>", visual_file(i));
+        for k in 0..part.hulls.len() {
+            let _ = writeln!(out, "    <mesh name=\"hull_{i}_{k}\" file=\"{}\" inertia=\"convex\"/>", hull_file(i, k));
+        }
+    }
+    let _ = writeln!(out, "  </asset>\n  <worldbody>");
+    let roots: Vec<usize> = (0..twin.parts.len()).filter(|&p| twin.tree.joint_of(p).is_none()).collect();
+    for &root in &roots {
+        body(twin, root, DVec3::ZERO, 2, &mut out);
+    }
+    let _ = writeln!(out, "  </worldbody>\n  <contact>");
+    // Parts that share a joint touch there by construction. MuJoCo filters such pairs itself only when the
+    // parent can move.
+    for joint in &twin.tree.joints {
+        let _ = writeln!(
+            out,
+            "    <exclude body1=\"{}\" body2=\"{}\"/>",
+            escape(&twin.tree.parts[joint.parent]),
+            escape(&twin.tree.parts[joint.child])
+        );
+    }
+    out + "  </contact>\n</mujoco>\n"
+}
+
+fn body(twin: &Twin, part: usize, parent_origin: DVec3, depth: usize, out: &mut String) {
+    let pad = "  ".repeat(depth);
+    let origin = link_origin(twin, part);
+    let model = &twin.parts[part];
+    let _ = writeln!(out, "{pad}<body name=\"{}\" pos=\"{}\">", escape(&model.name), xyz(origin - parent_origin));
+    let m = model.inertial.inertia;
+    let _ = writeln!(
+        out,
+        "{pad}  <inertial pos=\"{}\" mass=\"{:.9e}\" fullinertia=\"{:.9e} {:.9e} {:.9e} {:.9e} {:.9e} {:.9e}\"/>",
+        xyz(model.inertial.com - origin),
+        model.inertial.mass,
+        m.x_axis.x,
+        m.y_axis.y,
+        m.z_axis.z,
+        m.y_axis.x,
+        m.z_axis.x,
+        m.z_axis.y
+    );
+    if let Some(joint) = twin.tree.joint_of(part) {
+        let kind = match joint.screw.kind {
+            JointKind::Fixed => None,
+            JointKind::Prismatic => Some("slide"),
+            JointKind::Revolute | JointKind::Continuous => Some("hinge"),
+        };
+        if let Some(kind) = kind {
+            let range = if joint.screw.kind == JointKind::Continuous {
+                String::new()
+            } else {
+                format!(" range=\"{:.9} {:.9}\"", joint.limits[0], joint.limits[1])
+            };
+            let _ = writeln!(
+                out,
+                "{pad}  <joint name=\"{}\" type=\"{kind}\" axis=\"{}\"{range} damping=\"{:.6e}\"/>",
+                escape(&joint.name),
+                xyz(joint.screw.axis),
+                damping(twin, joint)
+            );
+        }
+    }
+    let [r, g, b] = mean_color(&model.mesh);
+    let _ = writeln!(
+        out,
+        "{pad}  <geom name=\"visual_{part}\" type=\"mesh\" mesh=\"visual_{part}\" contype=\"0\" conaffinity=\"0\" group=\"2\" density=\"0\" rgba=\"{r:.4} {g:.4} {b:.4} 1\"/>"
+    );
+    for k in 0..model.hulls.len() {
+        let _ = writeln!(
+            out,
+            "{pad}  <geom name=\"hull_{part}_{k}\" type=\"mesh\" mesh=\"hull_{part}_{k}\" group=\"3\" rgba=\"{r:.4} {g:.4} {b:.4} 1\"/>"
+        );
+    }
+    for joint in twin.tree.joints.iter().filter(|j| j.parent == part) {
+        body(twin, joint.child, origin, depth + 1, out);
+    }
+    let _ = writeln!(out, "{pad}</body>");
+}
