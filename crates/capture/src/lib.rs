@@ -1,0 +1,18 @@
+//! Recordings of an articulated object in several joint states: read, check, import, and render synthetic ones.
+//!
+//! - [`Recording`] reads the native layout (nerfstudio's `transforms.json` plus a per-frame `state`);
+//!   [`ViewCache`] keeps decoded views within a byte budget.
+//! - [`object`] loads articulated objects from URDF or MJCF, [`synth`] renders recordings of them.
+//! - [`truth`] is what `synth` knows and `build` must not read: only evaluation and tests open it.
+//!
+//! Cameras are OpenCV (x right, y down, z forward), pixel centres at +0.5, depth is z, 0 = unknown.
+
+pub mod error;
+pub mod object;
+pub mod recording;
+pub mod synth;
+pub mod truth;
+
+pub use error::CaptureError;
+pub use recording::{Frame, Recording, Split, View, ViewCache};
+pub use truth::Truth;

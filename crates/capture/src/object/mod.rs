@@ -1,0 +1,187 @@
+//! Articulated objects with their looks: what `synth` renders and `rollout` compares with.
+//!
+//! Geometry stands in the world frame (z up) with every joint at 0, the canonical configuration, as the tree's screws do.
+
+mod mesh_file;
+pub(crate) mod shapes;
+pub(crate) mod texture;
+mod urdf;
+
+pub use texture::Texture;
+
+use crate::CaptureError;
+use glam::{DVec3, Vec2, Vec3};
+use hingecast_geom::{KinematicTree, Pose, TriMesh};
+use std::path::{Path, PathBuf};
+
+/// An object with joints. `tree.parts[i]` names `parts[i]`; the joints' `values` are empty.
+#[derive(Clone, Debug, Default)]
+pub struct ArticulatedObject {
+    pub name: String,
+    /// The file it came from.
+    pub source: PathBuf,
+    /// Lengths are metres; PartNet-Mobility objects are scaled to a diagonal of about 2 instead.
+    pub metric: bool,
+    pub tree: KinematicTree,
+    pub parts: Vec<PartGeometry>,
+    pub materials: Vec<Material>,
+    pub textures: Vec<Texture>,
+}
+
+/// The triangles of one part, canonical world frame. Vertex arrays have one length.
+#[derive(Clone, Debug, Default)]
+pub struct PartGeometry {
+    /// Links of the source that this part is made of (fixed and minor joints merge links).
+    pub links: Vec<String>,
+    pub vertices: Vec<Vec3>,
+    /// Unit, or zero where the file has none.
+    pub normals: Vec<Vec3>,
+    pub uvs: Vec<Vec2>,
+    pub faces: Vec<[u32; 3]>,
+    /// Index into `materials`, one a face.
+    pub materials: Vec<u32>,
+}
+
+/// Diffuse colour (sRGB, 0..1) times texture.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Material {
+    pub color: [f32; 3],
+    /// Index into the object's textures.
+    pub texture: Option<usize>,
+}
+
+impl ArticulatedObject {
+    /// Loads a URDF or MJCF file, or a folder with `mobility.urdf`, `object.xml`, or a single such file.
+    ///
+    /// # Errors
+    /// When nothing is found, or the description or one of its meshes cannot be read.
+    pub fn load(path: &Path) -> Result<Self, CaptureError> {
+        let file = if path.is_dir() { description_in(path)? } else { path.to_path_buf() };
+        let text = std::fs::read_to_string(&file).map_err(|e| CaptureError::read(&file, e))?;
+        let xml = roxmltree::Document::parse(&text).map_err(|e| {
+            let hint = "open it in an XML editor at that line, or export it again";
+            CaptureError::new(format!("the object file is not XML: {e}"), file.display().to_string(), hint)
+        })?;
+        match xml.root_element().tag_name().name() {
+            "robot" => urdf::load(&file, &xml),
+            other => Err(CaptureError::new(
+                format!("the object file starts with <{other}>; <robot> (URDF) or <mujoco> (MJCF) is expected"),
+                file.display().to_string(),
+                "point at a URDF or MJCF file",
+            )),
+        }
+    }
+
+    /// Finds an OBJECT argument: a path, or a bare name in `objects/` (here or in `$HINGECAST_OBJECTS`) or in
+    /// `$HINGECAST_DATA/partnet-mobility-dev/`.
+    ///
+    /// # Errors
+    /// When it is nowhere; the hint lists the places.
+    pub fn resolve(argument: &str) -> Result<PathBuf, CaptureError> {
+        let path = PathBuf::from(argument);
+        if path.exists() {
+            return Ok(path);
+        }
+        let mut places = vec![PathBuf::from("objects")];
+        places.extend(std::env::var_os("HINGECAST_OBJECTS").map(PathBuf::from));
+        places.extend(std::env::var_os("HINGECAST_DATA").map(|d| PathBuf::from(d).join("partnet-mobility-dev")));
+        if let Some(found) = places.iter().map(|p| p.join(argument)).find(|p| p.exists()) {
+            return Ok(found);
+        }
+        let listed: Vec<String> = places.iter().map(|p| p.display().to_string()).collect();
+        Err(CaptureError::new(
+            format!("there is no object {argument}"),
+            format!("looked for a path and in {}", listed.join(", ")),
+            "give a path to a URDF or MJCF file or its folder, or set HINGECAST_OBJECTS or HINGECAST_DATA",
+        ))
+    }
+
+    /// All vertices with the parts at `poses` (world_from_canonical).
+    pub fn posed_vertices<'a>(&'a self, poses: &'a [Pose]) -> impl Iterator<Item = DVec3> + 'a {
+        self.parts.iter().zip(poses).flat_map(|(part, pose)| part.vertices.iter().map(|v| pose.apply(v.as_dvec3())))
+    }
+
+    /// Lower and upper corner with the joints at `q`; zero without geometry.
+    pub fn bounds(&self, q: &[f64]) -> (DVec3, DVec3) {
+        let poses = self.tree.poses(q);
+        let mut points = self.posed_vertices(&poses);
+        let first = points.next().unwrap_or_default();
+        points.fold((first, first), |(lo, hi), x| (lo.min(x), hi.max(x)))
+    }
+
+    /// Length of the canonical bounding box's diagonal.
+    pub fn diagonal(&self) -> f64 {
+        let (lo, hi) = self.bounds(&vec![0.0; self.tree.joints.len()]);
+        (hi - lo).length()
+    }
+
+    /// The part's surface with its colours at the vertices.
+    pub fn part_mesh(&self, part: usize) -> TriMesh {
+        let p = &self.parts[part];
+        let mut colors = vec![[200u8; 3]; p.vertices.len()];
+        for (face, &material) in p.faces.iter().zip(&p.materials) {
+            for &i in face {
+                let m = &self.materials[material as usize];
+                let texel = m.texture.map_or([1.0; 3], |t| self.textures[t].sample_srgb(p.uvs[i as usize]));
+                colors[i as usize] = [0, 1, 2].map(|c| (m.color[c] * texel[c] * 255.0).round() as u8);
+            }
+        }
+        TriMesh { vertices: p.vertices.clone(), faces: p.faces.clone(), colors }
+    }
+}
+
+/// The description file in a folder.
+fn description_in(folder: &Path) -> Result<PathBuf, CaptureError> {
+    for name in ["mobility.urdf", "object.xml", "robot.urdf", "robot.xml"] {
+        if folder.join(name).is_file() {
+            return Ok(folder.join(name));
+        }
+    }
+    let entries = std::fs::read_dir(folder).map_err(|e| CaptureError::read(folder, e))?;
+    let is_description = |p: &PathBuf| p.extension().is_some_and(|e| e == "urdf" || e == "xml");
+    let mut found: Vec<PathBuf> = entries.flatten().map(|e| e.path()).filter(is_description).collect();
+    found.sort();
+    match &found[..] {
+        [one] => Ok(one.clone()),
+        _ => Err(CaptureError::new(
+            format!("the folder holds {} .urdf or .xml files, one is expected", found.len()),
+            folder.display().to_string(),
+            "point at the file itself",
+        )),
+    }
+}
+
+impl PartGeometry {
+    /// Appends a mesh placed by `canonical_from_mesh`; `scale` acts in the mesh's frame.
+    pub(crate) fn append(&mut self, mesh: &PartGeometry, canonical_from_mesh: &Pose, scale: DVec3) {
+        let base = self.vertices.len() as u32;
+        let place = |v: &Vec3| canonical_from_mesh.apply(v.as_dvec3() * scale).as_vec3();
+        self.vertices.extend(mesh.vertices.iter().map(place));
+        let turn = |n: &Vec3| canonical_from_mesh.rotate(n.as_dvec3() / scale).as_vec3().normalize_or_zero();
+        self.normals.extend(mesh.normals.iter().map(turn));
+        self.uvs.extend_from_slice(&mesh.uvs);
+        self.faces.extend(mesh.faces.iter().map(|f| f.map(|i| i + base)));
+        self.materials.extend_from_slice(&mesh.materials);
+    }
+
+    /// Keeps one of several faces over the same three corners. PartNet stores each face twice with opposite winding,
+    /// and two coincident colours would flicker.
+    pub(crate) fn drop_duplicate_faces(&mut self) {
+        let key = |v: Vec3| (v * 1e5).round().as_ivec3().to_array();
+        let mut seen = std::collections::HashSet::new();
+        let keep: Vec<bool> = self
+            .faces
+            .iter()
+            .map(|f| {
+                let mut corners = f.map(|i| key(self.vertices[i as usize]));
+                corners.sort_unstable();
+                // Faces without area are never hit and only confuse normals.
+                corners[0] != corners[1] && corners[1] != corners[2] && seen.insert(corners)
+            })
+            .collect();
+        let mut flags = keep.iter();
+        self.faces.retain(|_| *flags.next().unwrap_or(&true));
+        let mut flags = keep.iter();
+        self.materials.retain(|_| *flags.next().unwrap_or(&true));
+    }
+}

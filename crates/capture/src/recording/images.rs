@@ -1,0 +1,122 @@
+//! Single images in and out: colour, mask, depth. Errors name the file.
+
+use crate::CaptureError;
+use image::codecs::png::{CompressionType, FilterType, PngEncoder};
+use image::{DynamicImage, ExtendedColorType, ImageEncoder};
+use std::io::Write;
+use std::path::Path;
+
+/// Decodes an image file.
+pub fn read(path: &Path) -> Result<DynamicImage, CaptureError> {
+    let bytes = std::fs::read(path).map_err(|e| {
+        let what =
+            if e.kind() == std::io::ErrorKind::NotFound { "an image is missing" } else { "cannot read an image" };
+        CaptureError::new(
+            format!("{what}: {e}"),
+            path.display().to_string(),
+            "copy the file again, or drop its frame: hingecast check --fix",
+        )
+    })?;
+    image::load_from_memory(&bytes).map_err(|e| {
+        CaptureError::new(
+            format!("an image cannot be decoded: {e}"),
+            format!("{} ({} bytes)", path.display(), bytes.len()),
+            "it is cut short or no PNG or JPEG: copy or export it again, or drop its frame: hingecast check --fix",
+        )
+    })
+}
+
+/// Depth in stored units (h*w, row-major) with its size: grey PNG of 8 or 16 bits, or .npy of (h, w) numbers.
+pub fn read_depth(path: &Path) -> Result<(Vec<f32>, usize, usize), CaptureError> {
+    if path.extension().is_some_and(|e| e == "npy") {
+        return read_depth_npy(path);
+    }
+    let image = read(path)?;
+    let (w, h) = (image.width() as usize, image.height() as usize);
+    let values = match image {
+        DynamicImage::ImageLuma16(i) => i.into_raw().into_iter().map(f32::from).collect(),
+        DynamicImage::ImageLuma8(i) => i.into_raw().into_iter().map(f32::from).collect(),
+        other => {
+            return Err(CaptureError::new(
+                format!("a depth image should be grey with 16 bits, not {:?}", other.color()),
+                path.display().to_string(),
+                "export depth as 16-bit grey PNG or .npy, not as a coloured preview",
+            ));
+        }
+    };
+    Ok((values, w, h))
+}
+
+fn read_depth_npy(path: &Path) -> Result<(Vec<f32>, usize, usize), CaptureError> {
+    let (values, shape) = read_npy(path)?;
+    let (h, w) = match shape[..] {
+        [h, w] | [h, w, 1] | [1, h, w] => (h, w),
+        _ => {
+            let hint = "save depth as an array of shape (height, width)";
+            let what = format!("a depth array has the shape {shape:?}");
+            return Err(CaptureError::new(what, path.display().to_string(), hint));
+        }
+    };
+    Ok((values.into_iter().map(|x| x as f32).collect(), w, h))
+}
+
+/// Any real-valued .npy array as row-major f64 with its shape.
+pub fn read_npy(path: &Path) -> Result<(Vec<f64>, Vec<usize>), CaptureError> {
+    let bytes = std::fs::read(path).map_err(|e| CaptureError::read(path, e))?;
+    let bad = |e: &dyn std::fmt::Display| {
+        let hint = "save it with numpy.save as a plain array of numbers";
+        CaptureError::new(format!("not a readable .npy array: {e}"), path.display().to_string(), hint)
+    };
+    let file = || npyz::NpyFile::new(&bytes[..]).map_err(|e| bad(&e));
+    let header = file()?;
+    let shape: Vec<usize> = header.shape().iter().map(|&n| n as usize).collect();
+    if header.order() != npyz::Order::C && shape.len() > 1 {
+        return Err(bad(&"it is in Fortran order"));
+    }
+    macro_rules! attempt {
+        ($($t:ty),*) => {$(
+            if let Ok(data) = file()?.data::<$t>() {
+                let values: Result<Vec<f64>, _> = data.map(|x| x.map(|x| x as f64)).collect();
+                return Ok((values.map_err(|e| bad(&e))?, shape));
+            }
+        )*};
+    }
+    attempt!(f32, f64, u16, u8, i16, i32, u32, i64, u64);
+    Err(bad(&format!("its type is {}", header.dtype().descr())))
+}
+
+/// Grey 8-bit PNG, fast compression.
+pub fn write_gray(path: &Path, pixels: &[u8], w: usize, h: usize) -> Result<(), CaptureError> {
+    write_png(path, pixels, w, h, ExtendedColorType::L8)
+}
+
+/// RGB 8-bit PNG, fast compression.
+pub fn write_rgb(path: &Path, pixels: &[u8], w: usize, h: usize) -> Result<(), CaptureError> {
+    write_png(path, pixels, w, h, ExtendedColorType::Rgb8)
+}
+
+/// Grey 16-bit PNG of depth in stored units; 0 = unknown.
+pub fn write_depth(path: &Path, pixels: &[u16], w: usize, h: usize) -> Result<(), CaptureError> {
+    // The encoder wants native byte order and swaps by itself.
+    let bytes: Vec<u8> = pixels.iter().flat_map(|p| p.to_ne_bytes()).collect();
+    write_png(path, &bytes, w, h, ExtendedColorType::L16)
+}
+
+fn write_png(path: &Path, bytes: &[u8], w: usize, h: usize, color: ExtendedColorType) -> Result<(), CaptureError> {
+    let mut out = Vec::with_capacity(bytes.len() / 2 + 1024);
+    let encoder = PngEncoder::new_with_quality(&mut out, CompressionType::Fast, FilterType::Adaptive);
+    encoder.write_image(bytes, w as u32, h as u32, color).map_err(|e| CaptureError::write(path, e))?;
+    write_file(path, &out)
+}
+
+/// Writes a file to a temporary name beside it and renames: readers never see half a file.
+pub fn write_file(path: &Path, bytes: &[u8]) -> Result<(), CaptureError> {
+    let mut name = path.file_name().unwrap_or_default().to_os_string();
+    name.push(".part");
+    let part = path.with_file_name(name);
+    let write = || {
+        std::fs::File::create(&part)?.write_all(bytes)?;
+        std::fs::rename(&part, path)
+    };
+    write().map_err(|e| CaptureError::write(path, e))
+}

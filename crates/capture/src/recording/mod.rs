@@ -1,0 +1,221 @@
+//! The native recording: nerfstudio's `transforms.json` plus our per-frame `state`.
+//!
+//! Keys of ours, all optional but `state`: per frame `state` (integer), `view`, `time` (seconds), `occluded` (bool),
+//! `occluder_mask_path`; for the whole `name`, `metric` (lengths are metres), `up` (world direction, default z).
+//! Instead of `state` a recording may have one `state_000/transforms.json` per state.
+//! Held-out frames are those that nerfstudio's `test_filenames` lists.
+
+mod cache;
+mod fields;
+mod fingerprint;
+pub mod images;
+pub(crate) mod transforms;
+mod view;
+mod write;
+
+pub use cache::ViewCache;
+pub use view::View;
+
+use crate::CaptureError;
+use glam::{DMat4, DVec3};
+use hingecast_geom::{Camera, Pose};
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+use transforms::{Document, Entry};
+
+/// Whether a frame may be fitted, or is kept for measuring.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum Split {
+    Train,
+    Test,
+}
+
+/// One picture of one state. Paths are absolute.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Frame {
+    pub state: usize,
+    /// Number of the view within its state.
+    pub view: usize,
+    pub split: Split,
+    pub camera: Camera,
+    pub color: PathBuf,
+    pub depth: Option<PathBuf>,
+    /// Scene units per stored depth unit.
+    pub depth_scale: f64,
+    pub mask: Option<PathBuf>,
+    /// The whole frame is hidden by the person: leave it out.
+    pub occluded: bool,
+    /// Pixels that show the person instead of the object (non-zero = hidden).
+    pub occluder_mask: Option<PathBuf>,
+    /// Seconds.
+    pub time: Option<f64>,
+}
+
+/// All frames of all states; pixels are read by [`Recording::load`].
+#[derive(Clone, Debug, PartialEq)]
+pub struct Recording {
+    pub root: PathBuf,
+    pub name: String,
+    pub frames: Vec<Frame>,
+    /// States with training frames: 0..n_states. Held-out states follow and have test frames only.
+    pub n_states: usize,
+    /// Lengths are metres; otherwise scene units.
+    pub metric: bool,
+    /// Unit vector that points up in the world.
+    pub up: DVec3,
+}
+
+/// Largest tolerated entry of |R'R - 1|: json files with 4 digits stay below, a scaled or sheared pose does not.
+pub(crate) const MAX_RIGIDITY_ERROR: f64 = 1e-3;
+
+impl Recording {
+    /// Opens a recording folder (or its `transforms.json`); reads no pixels.
+    ///
+    /// # Errors
+    /// The first thing that makes the recording unusable; `check` lists all of them.
+    pub fn open(path: &Path) -> Result<Self, CaptureError> {
+        let documents = transforms::read(path)?;
+        let mut problems = Vec::new();
+        let recording = Self::from_documents(&documents, &mut problems);
+        match problems.into_iter().next() {
+            Some(problem) => Err(problem),
+            None => Ok(recording),
+        }
+    }
+
+    /// What can be made of the documents; everything that is wrong goes to `problems`, frames with problems are left out.
+    pub(crate) fn from_documents(documents: &[Document], problems: &mut Vec<CaptureError>) -> Self {
+        let root = documents.first().map(|d| d.root.clone()).unwrap_or_default();
+        let mut frames = Vec::new();
+        let (mut name, mut metric, mut up) = (None, false, DVec3::Z);
+        for document in documents {
+            problems.extend(document.problems.iter().cloned());
+            name = name.or_else(|| document.name.clone());
+            metric |= document.metric;
+            up = document.up;
+            let mut next_view = BTreeMap::<usize, usize>::new();
+            for entry in &document.entries {
+                let next = next_view.entry(entry.state).or_default();
+                match frame(entry, *next) {
+                    Ok(f) => frames.push(f),
+                    Err(problem) => problems.push(problem),
+                }
+                *next += 1;
+            }
+        }
+        let n_states = count_states(&frames, documents, problems);
+        let folder = || root.file_name().map(|n| n.to_string_lossy().into_owned()).unwrap_or("recording".into());
+        let name = name.unwrap_or_else(folder);
+        Self { root, name, frames, n_states, metric, up }
+    }
+
+    /// Indices of the usable frames of a state, in file order; wholly occluded frames are left out.
+    pub fn frames_of(&self, state: usize, split: Split) -> Vec<usize> {
+        let wanted = |f: &Frame| f.state == state && f.split == split && !f.occluded;
+        (0..self.frames.len()).filter(|&i| wanted(&self.frames[i])).collect()
+    }
+}
+
+/// Checks one entry's numbers and turns its OpenGL pose into an OpenCV camera.
+fn frame(entry: &Entry, default_view: usize) -> Result<Frame, CaptureError> {
+    let place = |key: &str, value: String| format!("{}.{key} = {value}", entry.place);
+    let i = &entry.intrinsics;
+    if i.distortion.iter().any(|k| k.abs() > 1e-12) {
+        return Err(CaptureError::new(
+            "the lens is distorted; a recording holds undistorted pictures",
+            place("k1 k2 k3 k4 p1 p2", format!("{:?}", i.distortion)),
+            "hingecast import undistorts: hingecast import THIS -o RECORDING --format nerfstudio",
+        ));
+    }
+    if !(i.fx > 0.0 && i.fy > 0.0) {
+        return Err(CaptureError::new(
+            "the focal length is not positive",
+            place("fl_x, fl_y", format!("{}, {}", i.fx, i.fy)),
+            "give the focal length in pixels, about the image width for a phone",
+        ));
+    }
+    if i.width == 0 || i.height == 0 {
+        return Err(CaptureError::new(
+            "the image size is zero",
+            place("w, h", format!("{}, {}", i.width, i.height)),
+            "give the size of the colour image in pixels",
+        ));
+    }
+    let camera_from_world = camera_from_gl(&entry.world_from_camera, &entry.place)?;
+    Ok(Frame {
+        state: entry.state,
+        view: entry.view.unwrap_or(default_view),
+        split: entry.split,
+        camera: Camera { width: i.width, height: i.height, fx: i.fx, fy: i.fy, cx: i.cx, cy: i.cy, camera_from_world },
+        color: entry.color.clone(),
+        depth: entry.depth.clone(),
+        depth_scale: entry.depth_scale,
+        mask: entry.mask.clone(),
+        occluded: entry.occluded,
+        occluder_mask: entry.occluder_mask.clone(),
+        time: entry.time,
+    })
+}
+
+/// OpenCV `camera_from_world` of an OpenGL camera-to-world matrix: negate columns y and z, then invert.
+pub(crate) fn camera_from_gl(world_from_gl: &DMat4, place: &str) -> Result<Pose, CaptureError> {
+    let error = hingecast_geom::pose::rigidity_error(world_from_gl);
+    let value = || format!("{place}.transform_matrix");
+    if error.is_infinite() {
+        return Err(CaptureError::new(
+            "a camera pose has a number that is not finite",
+            value(),
+            "leave the frame out, or run hingecast check --fix",
+        ));
+    }
+    if !(error <= MAX_RIGIDITY_ERROR) {
+        let what = if glam::DMat3::from_mat4(*world_from_gl).determinant() < 0.0 {
+            "a camera pose is mirrored (determinant -1): one axis has the wrong sign".to_string()
+        } else {
+            format!("a camera pose is not rigid: |R'R - 1| = {error:.3e}, at most {MAX_RIGIDITY_ERROR:.0e} expected")
+        };
+        return Err(CaptureError::new(
+            what,
+            value(),
+            "rows are [R | t] with R orthonormal and (0 0 0 1) last; hingecast check --fix repairs small errors",
+        ));
+    }
+    let cv = DMat4::from_cols(world_from_gl.x_axis, -world_from_gl.y_axis, -world_from_gl.z_axis, world_from_gl.w_axis);
+    Ok(Pose::from_mat4(&cv).inverse())
+}
+
+/// OpenGL camera-to-world matrix of an OpenCV camera, as `transforms.json` holds it.
+pub(crate) fn gl_from_camera(camera_from_world: &Pose) -> DMat4 {
+    let m = camera_from_world.inverse().to_mat4();
+    DMat4::from_cols(m.x_axis, -m.y_axis, -m.z_axis, m.w_axis)
+}
+
+/// States with training frames must be 0..n; held-out states come after them.
+fn count_states(frames: &[Frame], documents: &[Document], problems: &mut Vec<CaptureError>) -> usize {
+    let mut train: Vec<usize> = frames.iter().filter(|f| f.split == Split::Train).map(|f| f.state).collect();
+    train.sort_unstable();
+    train.dedup();
+    let place = documents.first().map(|d| d.file.display().to_string()).unwrap_or_default();
+    // Problems met before explain missing frames better than what follows from them.
+    if frames.is_empty() && problems.is_empty() {
+        problems.push(CaptureError::new(
+            "the recording has no frames",
+            format!("{place}: frames = []"),
+            "record again, or point at the folder that holds the pictures' transforms.json",
+        ));
+    } else if train.is_empty() && problems.is_empty() {
+        problems.push(CaptureError::new(
+            "every frame is held out: nothing is left to fit",
+            format!("{place}: test_filenames lists all {} frames", frames.len()),
+            "take some file names out of test_filenames",
+        ));
+    }
+    if let Some((expected, &found)) = train.iter().enumerate().find(|(i, s)| i != *s) {
+        problems.push(CaptureError::new(
+            format!("states are not numbered 0, 1, 2, ...: state {expected} has no training frames"),
+            format!("{place}: frames[].state goes from {} to {found}", expected as i64 - 1),
+            "renumber the states without gaps (hingecast check --fix does it)",
+        ));
+    }
+    train.len()
+}

@@ -1,0 +1,94 @@
+//! The range over which a joint is worth playing.
+//!
+//! Limits in files are wider than the physical ones, and 0 is the mesh as stored, neither closed nor open. So: sample
+//! points of the moving side, follow them from 0 outwards in small steps, and count those whose path pierces a surface of
+//! the other side. The range ends where more than a few per cent have gone through something. If what is left is wider
+//! than a person would move it, keep the end at which the object is the most compact: that is the closed one.
+
+use super::scene::Scene;
+use crate::object::{ArticulatedObject, PartGeometry};
+use glam::{DVec3, Vec3A};
+use hingecast_geom::{JointKind, TriMesh};
+
+/// Where a joint is played, and why it ends there.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct UsefulRange {
+    /// Radians or scene units; `lower` is the closed end.
+    pub lower: f64,
+    pub upper: f64,
+}
+
+/// A person's hand moves a door this far without walking around it.
+const WIDEST_TURN_DEG: f64 = 100.0;
+const STEPS: usize = 60;
+const POINTS: usize = 3000;
+/// Share of the moving points that may pierce the rest: hinges and handles overlap their neighbours in real files.
+const PIERCING: f64 = 0.02;
+
+/// One range a joint of the tree, other joints at 0.
+pub fn useful_ranges(object: &ArticulatedObject) -> Vec<UsefulRange> {
+    (0..object.tree.joints.len()).map(|j| useful_range(object, j)).collect()
+}
+
+fn useful_range(object: &ArticulatedObject, joint: usize) -> UsefulRange {
+    let j = &object.tree.joints[joint];
+    let [lower, upper] = j.limits;
+    let rest = 0f64.clamp(lower, upper);
+    let moving = subtree(object, j.child);
+    let standing = Scene::new(
+        object.parts.iter().enumerate().filter(|(i, _)| !moving.contains(i)).map(|(_, p)| (p, Default::default())),
+    );
+    let points = sample(moving.iter().map(|&i| &object.parts[i]));
+    let step = (upper - lower) / STEPS as f64;
+    let reach = |direction: f64, limit: f64| {
+        let n = ((limit - rest).abs() / step).round().max(1.0) as usize;
+        let mut pierced = vec![false; points.len()];
+        let at = |k: usize| j.screw.motion(rest + direction * (limit - rest).abs() * k as f64 / n as f64);
+        for k in 0..n {
+            let (from, to) = (at(k), at(k + 1));
+            for (p, pierced) in points.iter().zip(&mut pierced).filter(|(_, done)| !**done) {
+                let (a, b) = (from.apply(*p).as_vec3(), to.apply(*p).as_vec3());
+                *pierced = standing.cast(Vec3A::from(a), Vec3A::from(b - a), 1.0).is_some();
+            }
+            let share = pierced.iter().filter(|&&x| x).count() as f64 / points.len().max(1) as f64;
+            if !(share <= PIERCING) {
+                return rest + direction * (limit - rest).abs() * k as f64 / n as f64;
+            }
+        }
+        limit
+    };
+    let (mut lo, mut hi) = (reach(-1.0, lower), reach(1.0, upper));
+    let widest = if j.screw.kind == JointKind::Prismatic { f64::INFINITY } else { WIDEST_TURN_DEG.to_radians() };
+    let compact = |q: f64| {
+        let mut all = vec![0.0; object.tree.joints.len()];
+        all[joint] = q;
+        let (lo, hi) = object.bounds(&all);
+        (hi - lo).element_product()
+    };
+    let low_is_closed = compact(lo) <= compact(hi);
+    if hi - lo > widest {
+        if low_is_closed { hi = lo + widest } else { lo = hi - widest }
+    }
+    UsefulRange { lower: if low_is_closed { lo } else { hi }, upper: if low_is_closed { hi } else { lo } }
+}
+
+/// The part and everything it carries.
+fn subtree(object: &ArticulatedObject, part: usize) -> Vec<usize> {
+    let mut out = vec![part];
+    let mut next = 0;
+    while next < out.len() {
+        let parent = out[next];
+        out.extend(object.tree.joints.iter().filter(|j| j.parent == parent).map(|j| j.child));
+        next += 1;
+    }
+    out
+}
+
+/// Points spread over the surfaces by area.
+fn sample<'a>(parts: impl Iterator<Item = &'a PartGeometry>) -> Vec<DVec3> {
+    let mut mesh = TriMesh::default();
+    for p in parts {
+        mesh.append(&TriMesh { vertices: p.vertices.clone(), faces: p.faces.clone(), colors: Vec::new() });
+    }
+    mesh.sample_surface(POINTS, 0).into_iter().map(|(x, _)| x.as_dvec3()).collect()
+}

@@ -1,0 +1,75 @@
+//! One view: supersampled colour; exact depth, mask and part at pixel centres.
+
+use super::scene::{Hit, Scene};
+use super::shade::Looks;
+use crate::object::texture::srgb_from_linear;
+use glam::{DVec2, Vec3, Vec3A};
+use hingecast_geom::{Camera, Pose};
+
+/// A rendered view, row-major. `depth` in scene units, 0 where nothing is hit; `part` is part id + 1, 0 = background.
+pub(crate) struct Picture {
+    pub rgb: Vec<u8>,
+    pub depth: Vec<f32>,
+    pub part: Vec<u8>,
+}
+
+/// Colour samples per pixel side, everywhere and where they differ (edges, print).
+const COARSE: usize = 2;
+const FINE: usize = 4;
+/// Linear-light difference between a pixel's samples above which it is sampled finely: about 6 steps of 255.
+const DIFFERS: f32 = 0.02;
+
+/// Renders `scene`, whose parts stand at `poses`. `background` is linear light.
+pub(crate) fn render(scene: &Scene, looks: &Looks, poses: &[Pose], camera: &Camera, background: Vec3) -> Picture {
+    let (w, h) = (camera.width, camera.height);
+    let world_from_camera = camera.camera_from_world.inverse();
+    let origin = Vec3A::from(world_from_camera.trans.as_vec3());
+    // Directions have camera z 1, so a hit's t is its depth. Affine in the pixel: base + x * dx + y * dy.
+    let dx = Vec3A::from(world_from_camera.rotate(glam::DVec3::X / camera.fx).as_vec3());
+    let dy = Vec3A::from(world_from_camera.rotate(glam::DVec3::Y / camera.fy).as_vec3());
+    let base = Vec3A::from(camera.ray(DVec2::ZERO).as_vec3());
+    let turns: Vec<glam::Quat> = poses.iter().map(|p| p.rot.as_quat()).collect();
+    let pixel_angle = (1.0 / camera.fx) as f32;
+
+    let cast = |x: f32, y: f32| -> (Option<Hit>, Vec3A) {
+        let direction = base + dx * x + dy * y;
+        (scene.cast(origin, direction, f32::INFINITY), direction)
+    };
+    let color = |x: f32, y: f32, side: usize| -> Vec3 {
+        match cast(x, y) {
+            (Some(hit), direction) => {
+                let footprint = hit.t * pixel_angle / side as f32;
+                looks.shade(&hit, direction, footprint, turns[hit.part])
+            }
+            (None, _) => background,
+        }
+    };
+    let mean = |x: usize, y: usize, side: usize| -> (Vec3, f32) {
+        let (mut sum, mut lo, mut hi) = (Vec3::ZERO, Vec3::INFINITY, Vec3::NEG_INFINITY);
+        for i in 0..side * side {
+            let offset = |k: usize| (k as f32 + 0.5) / side as f32;
+            let c = color(x as f32 + offset(i % side), y as f32 + offset(i / side), side);
+            (sum, lo, hi) = (sum + c, lo.min(c), hi.max(c));
+        }
+        (sum / (side * side) as f32, (hi - lo).max_element())
+    };
+
+    let mut out = Picture { rgb: vec![0; 3 * w * h], depth: vec![0.0; w * h], part: vec![0; w * h] };
+    for y in 0..h {
+        for x in 0..w {
+            let i = y * w + x;
+            if let (Some(hit), _) = cast(x as f32 + 0.5, y as f32 + 0.5) {
+                out.depth[i] = hit.t;
+                out.part[i] = hit.part as u8 + 1;
+            }
+            let (mut c, spread) = mean(x, y, COARSE);
+            if spread > DIFFERS {
+                (c, _) = mean(x, y, FINE);
+            }
+            for k in 0..3 {
+                out.rgb[3 * i + k] = (srgb_from_linear(c[k]).clamp(0.0, 1.0) * 255.0 + 0.5) as u8;
+            }
+        }
+    }
+    out
+}
