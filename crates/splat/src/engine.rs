@@ -1,0 +1,440 @@
+//! The engine: a set of gaussians with its optimiser state, rendered and differentiated on the CPU.
+
+use crate::adam::{self, Adam, Rates};
+use crate::error::{SplatError, check_finite, check_len};
+use crate::frame::FrameBuffers;
+use crate::kernels::{Kernels, Simd, kernels};
+use crate::loss::{LossConfig, LossTerms};
+use crate::params::{PAD, Planes, plane};
+use crate::pool::Pool;
+use crate::project::{CHUNK, PlaneTable};
+use crate::raster::{MAX_EXTRA, PLANES};
+use crate::target::Target;
+use crate::view::{View, twist_gradient};
+use hingecast_geom::{Camera, Gaussians, Pose};
+
+/// What to draw besides colour, depth and alpha.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct RenderOptions<'a> {
+    pub background: [f32; 3],
+    /// Values blended like colours (labels, one-hot parts, normals): (gaussians, channels), gaussian-major.
+    pub extra: &'a [f32],
+    /// 0..=32
+    pub channels: usize,
+}
+
+/// A rendered picture, row by row.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Render {
+    pub width: usize,
+    pub height: usize,
+    /// (h, w, 3) over the background.
+    pub rgb: Vec<f32>,
+    /// (h, w) premultiplied: sum of w_i z_i. See [`Render::depth_normalised`].
+    pub depth: Vec<f32>,
+    /// (h, w) sum of w_i, 0..1.
+    pub alpha: Vec<f32>,
+    /// (channels, h, w) premultiplied: sum of w_i e_i; divide by alpha for the mean value.
+    pub extra: Vec<f32>,
+}
+
+impl Render {
+    /// z in scene units where alpha is above one half, 0 (unknown) elsewhere. (h, w)
+    pub fn depth_normalised(&self) -> Vec<f32> {
+        self.depth.iter().zip(&self.alpha).map(|(d, a)| if *a > 0.5 { d / a } else { 0.0 }).collect()
+    }
+}
+
+/// Gradient of a scalar by the pixels of the last render; an empty vector counts as zero.
+#[derive(Clone, Debug, Default)]
+pub struct PixelGradients {
+    /// (h, w, 3)
+    pub rgb: Vec<f32>,
+    /// (h, w) by the premultiplied depth.
+    pub depth: Vec<f32>,
+    /// (h, w)
+    pub alpha: Vec<f32>,
+    /// (channels, h, w) by the premultiplied extra channels.
+    pub extra: Vec<f32>,
+}
+
+/// Gradients of a scalar by everything that the engine can move.
+#[derive(Clone, Debug, Default)]
+pub struct Gradients {
+    /// By the (canonical) parameters, in parameter layout. Add regularisers here before [`Engine::adam_step`].
+    pub params: Planes,
+    /// By each group's pose: world_from_group <- exp(xi) * world_from_group, xi = (vx vy vz wx wy wz), translation first,
+    /// world frame, rotation about the world origin. Length 1 (moving everything) without groups.
+    pub poses: Vec<[f64; 6]>,
+    /// The same twist applied to the whole world: camera_from_world <- camera_from_world * exp(xi). Sum of `poses`.
+    pub camera: [f64; 6],
+    /// By the extra values of the last render. (gaussians, channels)
+    pub extra: Vec<f32>,
+}
+
+/// Gaussians, Adam state, buffers and threads. One image at a time.
+pub struct Engine {
+    params: Planes,
+    first: Planes,
+    second: Planes,
+    steps: u64,
+    /// Group per gaussian, padded; empty without groups.
+    groups: Vec<u16>,
+    poses: Vec<Pose>,
+    pool: Pool,
+    kernels: &'static Kernels,
+    simd: Simd,
+    buffers: FrameBuffers,
+    /// Camera of the picture in `buffers`, while the parameters are those it was rendered with.
+    rendered: Option<Camera>,
+}
+
+impl Engine {
+    /// `threads` counts the caller; 0 counts as 1. The results do not depend on it.
+    ///
+    /// # Errors
+    /// Empty sets, arrays of different lengths, NaN or inf.
+    pub fn from_gaussians(gaussians: &Gaussians, threads: usize) -> Result<Self, SplatError> {
+        Self::with_simd(gaussians, threads, Simd::best())
+    }
+
+    /// As [`Engine::from_gaussians`] with a chosen instruction set; one that the CPU lacks falls back to plain code.
+    ///
+    /// # Errors
+    /// As [`Engine::from_gaussians`].
+    pub fn with_simd(gaussians: &Gaussians, threads: usize, simd: Simd) -> Result<Self, SplatError> {
+        let params = Planes::from_gaussians(gaussians)?;
+        let moments = Planes::zeros(params.len(), params.count());
+        Ok(Self {
+            first: moments.clone(),
+            second: moments,
+            params,
+            steps: 0,
+            groups: Vec::new(),
+            poses: Vec::new(),
+            pool: Pool::new(threads),
+            kernels: kernels(simd),
+            simd,
+            buffers: FrameBuffers::default(),
+            rendered: None,
+        })
+    }
+
+    pub fn len(&self) -> usize {
+        self.params.len()
+    }
+
+    pub fn is_empty(&self) -> bool {
+        self.params.is_empty()
+    }
+
+    pub fn simd(&self) -> Simd {
+        self.simd
+    }
+
+    /// The (canonical) gaussians in interchange layout.
+    pub fn gaussians(&self) -> Gaussians {
+        self.params.to_gaussians()
+    }
+
+    /// Parameters as planes.
+    pub fn params(&self) -> &Planes {
+        &self.params
+    }
+
+    /// Parameters to change in place. Keep them finite.
+    pub fn params_mut(&mut self) -> &mut Planes {
+        self.rendered = None;
+        &mut self.params
+    }
+
+    /// Adam's first and second moments and the number of steps taken.
+    pub fn moments(&self) -> (&Planes, &Planes, u64) {
+        (&self.first, &self.second, self.steps)
+    }
+
+    /// Parameters and moments to change in place (relocation, checkpoints).
+    pub(crate) fn state_mut(&mut self) -> (&mut Planes, &mut Planes, &mut Planes, &mut u64) {
+        self.rendered = None;
+        (&mut self.params, &mut self.first, &mut self.second, &mut self.steps)
+    }
+
+    /// Forgets Adam's state.
+    pub fn reset_moments(&mut self) {
+        self.first = Planes::zeros(self.params.len(), self.params.count());
+        self.second = self.first.clone();
+        self.steps = 0;
+    }
+
+    /// From now on gaussian i is drawn at `world_from_group[groups[i]]` times its canonical pose. View-dependent colour turns
+    /// with the group. Empty slices: one group at rest. Sorting gaussians by group is faster.
+    ///
+    /// # Errors
+    /// Not one group per gaussian, a group without pose, a pose that is not finite.
+    pub fn set_groups(&mut self, groups: &[u16], world_from_group: &[Pose]) -> Result<(), SplatError> {
+        if groups.is_empty() && world_from_group.is_empty() {
+            self.groups.clear();
+            self.poses.clear();
+            self.rendered = None;
+            return Ok(());
+        }
+        check_len("groups", groups.len(), self.len(), "one per gaussian")?;
+        if let Some(g) = groups.iter().find(|g| usize::from(**g) >= world_from_group.len()) {
+            return Err(SplatError::Range { what: "groups", value: f64::from(*g), range: "0..number of poses" });
+        }
+        let mut padded = groups.to_vec();
+        padded.resize(self.len().next_multiple_of(PAD), *groups.last().unwrap_or(&0));
+        self.groups = padded;
+        self.poses.clear();
+        self.set_poses_unchecked_len(world_from_group)
+    }
+
+    /// New poses for the groups of [`Engine::set_groups`].
+    ///
+    /// # Errors
+    /// Not as many as before, or not finite.
+    pub fn set_poses(&mut self, world_from_group: &[Pose]) -> Result<(), SplatError> {
+        check_len("world_from_group", world_from_group.len(), self.poses.len(), "one per group")?;
+        self.set_poses_unchecked_len(world_from_group)
+    }
+
+    fn set_poses_unchecked_len(&mut self, world_from_group: &[Pose]) -> Result<(), SplatError> {
+        for pose in world_from_group {
+            if !(pose.rot.is_finite() && pose.trans.is_finite()) {
+                return Err(SplatError::Range { what: "world_from_group", value: f64::NAN, range: "the finite poses" });
+            }
+        }
+        self.rendered = None;
+        self.poses = world_from_group.to_vec();
+        Ok(())
+    }
+
+    pub fn poses(&self) -> &[Pose] {
+        &self.poses
+    }
+
+    /// Group per gaussian; empty without groups.
+    pub fn groups(&self) -> &[u16] {
+        &self.groups[..self.groups.len().min(self.len())]
+    }
+
+    /// # Errors
+    /// An impossible camera, extra values of the wrong length or not finite, too many channels.
+    pub fn render(&mut self, camera: &Camera, options: &RenderOptions) -> Result<Render, SplatError> {
+        self.forward(camera, options)?;
+        let b = &self.buffers;
+        let (w, h) = (camera.width, camera.height);
+        let (stride, plane_len) = (b.view.stride(), b.view.plane_len());
+        let plane = |k: usize| {
+            (0..h).flat_map(move |y| &b.image[k * plane_len + y * stride..][..w]).copied()
+        };
+        let mut rgb = vec![0f32; 3 * w * h];
+        for c in 0..3 {
+            for (to, v) in rgb[c..].iter_mut().step_by(3).zip(plane(c)) {
+                *to = v;
+            }
+        }
+        Ok(Render {
+            width: w,
+            height: h,
+            rgb,
+            depth: plane(3).collect(),
+            alpha: plane(4).map(|t| 1.0 - t).collect(),
+            extra: (0..options.channels).flat_map(|c| plane(PLANES + c)).collect(),
+        })
+    }
+
+    /// Renders into the buffers.
+    fn forward(&mut self, camera: &Camera, options: &RenderOptions) -> Result<(), SplatError> {
+        self.rendered = None;
+        let view = View::new(camera, &self.poses)?;
+        check_finite("background", &options.background)?;
+        if options.channels > MAX_EXTRA {
+            return Err(SplatError::Range { what: "channels", value: options.channels as f64, range: "0..=32" });
+        }
+        check_len("extra", options.extra.len(), self.len() * options.channels, "gaussians x channels")?;
+        check_finite("extra", options.extra)?;
+        self.buffers.background = options.background;
+        self.buffers.channels = options.channels;
+        self.buffers.extra.clear();
+        self.buffers.extra.extend_from_slice(options.extra);
+        self.buffers.extra.resize(self.params.padded(0).len() * options.channels, 0.0);
+        self.buffers.forward(&mut self.pool, self.kernels, &self.params, &self.groups, view);
+        self.rendered = Some(*camera);
+        Ok(())
+    }
+
+    /// Loss of the current parameters, without gradients.
+    ///
+    /// # Errors
+    /// Of the camera only; a [`Target`] has checked its own.
+    pub fn loss(&mut self, target: &Target, config: &LossConfig) -> Result<LossTerms, SplatError> {
+        self.forward(&target.camera, &RenderOptions { background: target.background, ..Default::default() })?;
+        Ok(self.buffers.loss(&mut self.pool, self.kernels, target, config))
+    }
+
+    /// Loss, and its gradients by parameters, group poses and camera pose. `gradients` is overwritten.
+    ///
+    /// # Errors
+    /// As [`Engine::loss`].
+    pub fn loss_and_gradients(
+        &mut self,
+        target: &Target,
+        config: &LossConfig,
+        gradients: &mut Gradients,
+    ) -> Result<LossTerms, SplatError> {
+        let terms = self.loss(target, config)?;
+        self.finish_gradients(&target.camera, gradients);
+        Ok(terms)
+    }
+
+    /// As [`Engine::loss_and_gradients`], with extra channels and a loss on them: `extra_loss(rendered, gradient)` gets both
+    /// as (channels, h, w) premultiplied planes, fills the gradient (zeros before) and returns its loss, which is added to
+    /// `total`.
+    ///
+    /// # Errors
+    /// As [`Engine::render`].
+    pub fn loss_and_gradients_with_extra(
+        &mut self,
+        target: &Target,
+        config: &LossConfig,
+        extra: &[f32],
+        channels: usize,
+        extra_loss: impl FnOnce(&[f32], &mut [f32]) -> f64,
+        gradients: &mut Gradients,
+    ) -> Result<LossTerms, SplatError> {
+        let render = self.render(&target.camera, &RenderOptions { background: target.background, extra, channels })?;
+        let mut terms = self.buffers.loss(&mut self.pool, self.kernels, target, config);
+        let mut by_extra = vec![0f32; render.extra.len()];
+        terms.total += extra_loss(&render.extra, &mut by_extra);
+        self.set_gradient_planes(PLANES, channels, &by_extra, 1);
+        self.finish_gradients(&target.camera, gradients);
+        Ok(terms)
+    }
+
+    /// Gradients of any scalar of the last render, given its gradient by the pixels. `gradients` is overwritten.
+    ///
+    /// # Errors
+    /// Nothing was rendered since the parameters changed; wrong lengths.
+    pub fn backward(&mut self, pixels: &PixelGradients, gradients: &mut Gradients) -> Result<(), SplatError> {
+        let Some(camera) = self.rendered else { return Err(SplatError::NotRendered) };
+        let count = camera.width * camera.height;
+        let channels = self.buffers.channels;
+        for (what, values, expected) in [
+            ("gradient.rgb", &pixels.rgb, 3 * count),
+            ("gradient.depth", &pixels.depth, count),
+            ("gradient.alpha", &pixels.alpha, count),
+            ("gradient.extra", &pixels.extra, channels * count),
+        ] {
+            if !values.is_empty() {
+                check_len(what, values.len(), expected, "the size of the last render, or empty")?;
+            }
+        }
+        self.set_gradient_planes(0, 3, &pixels.rgb, 3);
+        self.set_gradient_planes(3, 1, &pixels.depth, 1);
+        self.set_gradient_planes(4, 1, &pixels.alpha, 1);
+        self.set_gradient_planes(PLANES, channels, &pixels.extra, 1);
+        self.finish_gradients(&camera, gradients);
+        Ok(())
+    }
+
+    /// Copies planes of the picture's size (`interleave` 1) or interleaved pixels into the padded gradient planes.
+    fn set_gradient_planes(&mut self, first: usize, count: usize, values: &[f32], interleave: usize) {
+        let view = &self.buffers.view;
+        let (w, h, stride, len) = (view.width, view.height, view.stride(), view.plane_len());
+        for k in 0..count {
+            let plane = &mut self.buffers.gradient[(first + k) * len..(first + k + 1) * len];
+            plane.fill(0.0);
+            if values.is_empty() {
+                continue;
+            }
+            for y in 0..h {
+                for x in 0..w {
+                    let i = y * w + x;
+                    plane[y * stride + x] = if interleave > 1 { values[i * interleave + k] } else { values[k * w * h + i] };
+                }
+            }
+        }
+    }
+
+    fn finish_gradients(&mut self, camera: &Camera, gradients: &mut Gradients) {
+        let (len, count) = (self.params.len(), self.params.count());
+        if gradients.params.len() != len || gradients.params.count() != count {
+            gradients.params = Planes::zeros(len, count);
+        }
+        let channels = self.buffers.channels;
+        gradients.extra.resize(self.params.padded(0).len() * channels, 0.0);
+        self.buffers.backward(&mut self.pool, self.kernels);
+        let frames = self.buffers.to_gradients(
+            &mut self.pool,
+            self.kernels,
+            &self.params,
+            &self.groups,
+            &mut gradients.params,
+            &mut gradients.extra,
+        );
+        gradients.extra.truncate(len * channels);
+        let at_rest = [Pose::IDENTITY];
+        let poses = if self.poses.is_empty() { &at_rest[..] } else { &self.poses };
+        gradients.poses.clear();
+        gradients.poses.extend(frames.iter().zip(poses).map(|(sums, pose)| twist_gradient(sums, camera, pose)));
+        gradients.camera = [0.0; 6];
+        for twist in &gradients.poses {
+            for k in 0..6 {
+                gradients.camera[k] += twist[k];
+            }
+        }
+    }
+
+    /// One Adam step on gradients that other code may have added to. Gaussians whose gradients are all zero keep still.
+    ///
+    /// # Errors
+    /// Gradients of another set, or not finite.
+    pub fn adam_step(&mut self, gradients: &Gradients, rates: &Rates) -> Result<(), SplatError> {
+        check_len("gradients.params", gradients.params.len(), self.len(), "one per gaussian")?;
+        check_len("gradients.params planes", gradients.params.count(), self.params.count(), "one per parameter")?;
+        for k in 0..gradients.params.count() {
+            check_finite("gradients.params", gradients.params.plane(k))?;
+        }
+        self.rendered = None;
+        let args = adam::Args {
+            adam: self.next_adam(rates),
+            gradients: PlaneTable::read_only(&gradients.params),
+            len: self.params.padded(0).len(),
+            count: self.params.count(),
+        };
+        let kernel = self.kernels.adam;
+        self.pool.run(args.len.div_ceil(CHUNK), |i| unsafe { kernel(&args, i) });
+        Ok(())
+    }
+
+    /// Loss, gradients and Adam in one go, without storing gradients: the same result as [`Engine::loss_and_gradients`]
+    /// then [`Engine::adam_step`], faster.
+    ///
+    /// # Errors
+    /// As [`Engine::loss`].
+    pub fn step(&mut self, target: &Target, config: &LossConfig, rates: &Rates) -> Result<LossTerms, SplatError> {
+        let terms = self.loss(target, config)?;
+        self.buffers.backward(&mut self.pool, self.kernels);
+        self.rendered = None;
+        let adam = self.next_adam(rates);
+        self.buffers.to_adam(&mut self.pool, self.kernels, &mut self.params, &self.groups, adam);
+        Ok(terms)
+    }
+
+    fn next_adam(&mut self, rates: &Rates) -> Adam {
+        self.steps += 1;
+        Adam::new(
+            PlaneTable::new(&mut self.params),
+            PlaneTable::new(&mut self.first),
+            PlaneTable::new(&mut self.second),
+            rates,
+            self.steps,
+        )
+    }
+
+    /// Opacity in (0, 1) of every gaussian.
+    pub fn opacities(&self) -> Vec<f32> {
+        self.params.plane(plane::OPACITY).iter().map(|x| 1.0 / (1.0 + (-x).exp())).collect()
+    }
+}
