@@ -1,0 +1,194 @@
+//! The flags. Units and defaults are in the help texts.
+
+use clap::{Args, Parser, Subcommand};
+use hingecast::config::{Method, Preset};
+use std::path::PathBuf;
+
+/// A cast of a thing, with its hinges: RGB-D recordings of an articulated object become a twin that MuJoCo runs.
+#[derive(Parser, Debug)]
+#[command(version, max_term_width = 110)]
+pub struct Cli {
+    #[command(subcommand)]
+    pub verb: Verb,
+    /// Machine-readable answer on stdout; everything human stays on stderr.
+    #[arg(long, global = true)]
+    pub json: bool,
+    /// No progress on stderr.
+    #[arg(long, short, global = true)]
+    pub quiet: bool,
+    /// Worker threads [default: all cores]. The results do not depend on it.
+    #[arg(long, global = true, value_name = "N")]
+    pub threads: Option<usize>,
+}
+
+#[derive(Subcommand, Debug)]
+pub enum Verb {
+    /// Record a sample object, build its twin, write the report: the whole path in a few minutes.
+    Demo(Demo),
+    /// Render a recording of an articulated object (URDF, MJCF, PartNet-Mobility) together with its truth.
+    Synth(Synth),
+    /// Convert a recording of another layout (nerfstudio, ArtGS, DTA, PARIS, ScrewSplat, Dynamic 3D Gaussians).
+    Import(Import),
+    /// Say what is wrong with a recording and what to try; `--fix` repairs what is safe to repair.
+    Check(Check),
+    /// Build the twin of a recording. Run again to resume; finished stages are kept.
+    Build(Build),
+    /// Compare a run with the truth of its recording.
+    Eval(Eval),
+    /// Write the report of a run again.
+    Report(Report),
+    /// Record, build and evaluate a suite of objects; print the table of errors and times.
+    Bench(Bench),
+    /// Say what this machine has and lacks.
+    Doctor,
+}
+
+#[derive(Args, Debug)]
+pub struct Demo {
+    /// Sample object to record.
+    #[arg(default_value = "hinged_box")]
+    pub object: String,
+    /// Folder for recording and run.
+    #[arg(long, short, default_value = "runs/demo")]
+    pub out: PathBuf,
+}
+
+#[derive(Args, Debug)]
+pub struct Synth {
+    /// Folder or file of the object, or the name of a sample (see objects/) or of one in $HINGECAST_DATA.
+    pub object: String,
+    /// Recording folder to write; the truth goes to <OUT>.truth.
+    #[arg(long, short)]
+    pub out: PathBuf,
+    #[command(flatten)]
+    pub settings: SynthSettings,
+    /// Leave the truth folder out.
+    #[arg(long)]
+    pub no_truth: bool,
+}
+
+#[derive(Args, Debug, Clone)]
+pub struct SynthSettings {
+    /// Joint configurations; 2 = both ends.
+    #[arg(long, default_value_t = 25)]
+    pub states: usize,
+    /// Training cameras per state.
+    #[arg(long, default_value_t = 60)]
+    pub views: usize,
+    /// Held-out cameras per state.
+    #[arg(long, default_value_t = 4)]
+    pub test_views: usize,
+    /// Image width and height, pixels.
+    #[arg(long, default_value_t = 256)]
+    pub size: usize,
+    /// Sensor model: `none` is exact; `d435` has depth noise, holes, colour noise, ragged masks and poses off by 0.5 deg and 3 mm.
+    #[arg(long, default_value = "none", value_parser = ["none", "d435"])]
+    pub noise: String,
+    /// A hand and forearm reach in on some frames.
+    #[arg(long)]
+    pub occluders: bool,
+    /// Play of a joint: NAME=FROM:TO in radians or scene units; may be repeated [default: its useful range].
+    #[arg(long = "range", value_name = "JOINT=FROM:TO")]
+    pub ranges: Vec<String>,
+    /// Seed of cameras, play and noise.
+    #[arg(long, default_value_t = 0)]
+    pub seed: u64,
+}
+
+#[derive(Args, Debug)]
+pub struct Import {
+    /// Folder of the recording to convert.
+    pub source: PathBuf,
+    /// Recording folder to write.
+    #[arg(long, short)]
+    pub out: PathBuf,
+    /// Layout of the source: auto, nerfstudio, artgs, dta, paris, screwsplat or dynamic3dgs.
+    #[arg(long, default_value = "auto")]
+    pub format: String,
+}
+
+#[derive(Args, Debug)]
+pub struct Check {
+    pub recording: PathBuf,
+    /// Repair what is safe: the old transforms.json is kept beside the new one.
+    #[arg(long)]
+    pub fix: bool,
+}
+
+#[derive(Args, Debug)]
+pub struct Build {
+    pub recording: PathBuf,
+    /// Run folder [default: runs/<recording's name>].
+    #[arg(long, short)]
+    pub out: Option<PathBuf>,
+    #[command(flatten)]
+    pub settings: BuildSettings,
+    /// First stage to redo: splat, motion, parts, joints or twin.
+    #[arg(long, value_name = "STAGE")]
+    pub from: Option<String>,
+    /// Last stage to run.
+    #[arg(long, value_name = "STAGE")]
+    pub to: Option<String>,
+    /// Throw an existing run away first.
+    #[arg(long)]
+    pub fresh: bool,
+    /// Exit with 1 when the run has doubts.
+    #[arg(long)]
+    pub strict: bool,
+}
+
+#[derive(Args, Debug, Clone)]
+pub struct BuildSettings {
+    #[arg(long, value_enum, default_value = "default")]
+    pub preset: Preset,
+    /// How motion, parts and joints are found.
+    #[arg(long, value_enum)]
+    pub method: Option<Method>,
+    /// TOML file with settings; its keys beat the preset.
+    #[arg(long, value_name = "FILE")]
+    pub config: Option<PathBuf>,
+    /// One setting, for instance `fit.steps=2000`; beats the file. May be repeated.
+    #[arg(long = "set", value_name = "KEY=VALUE")]
+    pub set: Vec<String>,
+    /// Seed of everything random [default: 0].
+    #[arg(long)]
+    pub seed: Option<u64>,
+}
+
+#[derive(Args, Debug)]
+pub struct Eval {
+    /// Run folder.
+    pub run: PathBuf,
+    /// Truth folder of the run's recording.
+    #[arg(long)]
+    pub truth: PathBuf,
+    /// Exit with 1 unless KEY stays within VALUE; keys: joint.axis_deg (at most), joint.pivot (at most, share of the
+    /// diagonal), psnr (at least, dB), parts (1 = count must be right). May be repeated.
+    #[arg(long = "fail-under", value_name = "KEY=VALUE")]
+    pub bars: Vec<String>,
+}
+
+#[derive(Args, Debug)]
+pub struct Report {
+    pub run: PathBuf,
+}
+
+#[derive(Args, Debug)]
+pub struct Bench {
+    /// `ours` (objects/), `real` ($HINGECAST_DATA), `all`, or object names.
+    #[arg(default_value = "ours")]
+    pub suite: Vec<String>,
+    /// Folder for recordings and runs; existing ones are reused.
+    #[arg(long, short, default_value = "runs/bench")]
+    pub out: PathBuf,
+    #[command(flatten)]
+    pub synth: SynthSettings,
+    #[command(flatten)]
+    pub build: BuildSettings,
+    /// Compare with the table of an earlier bench (its bench.json); exit 1 when a figure got clearly worse.
+    #[arg(long, value_name = "FILE")]
+    pub against: Option<PathBuf>,
+    /// Delete each recording once it is evaluated (56 MB per object at the defaults).
+    #[arg(long)]
+    pub tidy: bool,
+}

@@ -1,0 +1,121 @@
+//! `hingecast eval`: a run against the truth, by the definitions of docs/metrics.md.
+//! The only code outside the tests that opens a truth folder.
+
+pub mod joints;
+pub mod matching;
+pub mod pictures;
+pub mod surfaces;
+
+use crate::failure::{Failure, Result};
+use crate::run;
+use crate::stage::{RunFolder, read_json, write_json};
+use hingecast_capture::{Recording, Truth, ViewCache};
+use hingecast_geom::{KinematicTree, Progress, TriMesh};
+use serde::{Deserialize, Serialize};
+use std::path::Path;
+
+/// `eval.json`. Lengths in scene units, angles in degrees, Chamfer in 1e-3 square scene units.
+#[derive(Clone, Debug, Serialize, Deserialize)]
+pub struct Evaluation {
+    pub object: String,
+    pub diagonal: f64,
+    pub true_parts: usize,
+    pub found_parts: usize,
+    /// Share of true joints whose matched joint has the right type.
+    pub joint_type_accuracy: f64,
+    /// Share of true parts whose parent is right.
+    pub tree_accuracy: f64,
+    pub joints: Vec<joints::JointErrors>,
+    pub surfaces: Vec<surfaces::SurfaceErrors>,
+    pub first_state: pictures::PictureErrors,
+    pub other_states: pictures::PictureErrors,
+    pub build_secs: f64,
+    pub peak_memory_gb: f64,
+    pub doubts: Vec<String>,
+}
+
+impl Evaluation {
+    pub fn parts_right(&self) -> bool {
+        self.true_parts == self.found_parts
+    }
+
+    fn over<T>(&self, pick: impl Fn(&joints::JointErrors) -> Option<T>) -> Vec<T> {
+        self.joints.iter().filter_map(pick).collect()
+    }
+
+    pub fn axis_max(&self) -> f64 {
+        self.over(|j| Some(j.axis_deg)).into_iter().fold(0.0, f64::max)
+    }
+
+    /// Largest pivot error of the hinges, share of the diagonal; `None` without hinges.
+    pub fn pivot_max(&self) -> Option<f64> {
+        self.over(|j| j.pivot).into_iter().map(|p| p / self.diagonal).reduce(f64::max)
+    }
+}
+
+/// Evaluates `run` and writes `eval.json` into it.
+///
+/// # Errors
+/// When the run is unfinished, or run and truth are not of the same recording.
+pub fn evaluate(run: &Path, truth: &Path, progress: &Progress) -> Result<Evaluation> {
+    let folder = RunFolder::open(run)?;
+    let truth = Truth::open(truth)?;
+    let twin: run::TwinFile = read_json(&folder.folder("twin").join("twin.json"))?;
+    let recording = Recording::open(&folder.record.recording)?;
+    if recording.n_states != truth.n_states {
+        return Err(Failure::new(
+            format!("the recording has {} states, the truth {}", recording.n_states, truth.n_states),
+            truth.root.display().to_string(),
+            "give the truth of this run's recording: <RECORDING>.truth",
+        ));
+    }
+    let cache = ViewCache::new(&recording, 512 << 20);
+
+    // Everything in the reference state, world frame: state 0.
+    let true_poses = truth.tree.poses_at(0);
+    let true_meshes: Vec<TriMesh> =
+        truth.part_meshes()?.iter().zip(&true_poses).map(|(m, pose)| m.transformed(pose)).collect();
+    let found_meshes = twin.meshes(&folder.folder("twin"))?;
+    progress.report(1, 10, "")?;
+
+    let seen = surfaces::Seen::new(&recording, &cache)?;
+    progress.report(3, 10, "")?;
+    let matching = matching::match_parts(&found_meshes, &true_meshes, &twin.tree, &truth.tree);
+    let joints = joints::errors(&twin.tree, &truth.tree, &matching, &true_meshes, truth.diagonal);
+    let surfaces = surfaces::errors(&found_meshes, &true_meshes, &matching, &twin.tree, &truth.tree, truth.diagonal, &seen);
+    progress.report(6, 10, "")?;
+    let (first_state, other_states) = pictures::errors(&folder, &twin.tree, &recording, &truth, &matching, progress)?;
+
+    let n_joints = truth.tree.joints.len().max(1) as f64;
+    let right_types = joints.iter().filter(|j| j.type_right).count() as f64;
+    let evaluation = Evaluation {
+        object: truth.object.clone(),
+        diagonal: truth.diagonal,
+        true_parts: truth.tree.parts.len(),
+        found_parts: twin.tree.parts.len(),
+        joint_type_accuracy: right_types / n_joints,
+        tree_accuracy: tree_accuracy(&twin.tree, &truth.tree, &matching),
+        joints,
+        surfaces,
+        first_state,
+        other_states,
+        build_secs: folder.record.total_secs(),
+        peak_memory_gb: folder.record.peak_memory() as f64 / 1e9,
+        doubts: twin.doubts.clone(),
+    };
+    write_json(&run.join("eval.json"), &evaluation)?;
+    Ok(evaluation)
+}
+
+/// Share of true parts whose matched part hangs on the match of the true parent (roots on nothing).
+fn tree_accuracy(found: &KinematicTree, truth: &KinematicTree, matching: &[Option<usize>]) -> f64 {
+    let right = (0..truth.parts.len()).filter(|&t| {
+        let Some(f) = matching[t] else { return false };
+        match (truth.joint_of(t), found.joint_of(f)) {
+            (None, None) => true,
+            (Some(a), Some(b)) => matching[a.parent] == Some(b.parent),
+            _ => false,
+        }
+    });
+    right.count() as f64 / truth.parts.len().max(1) as f64
+}

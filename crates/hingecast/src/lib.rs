@@ -1,0 +1,10 @@
+//! The facade: stages, configuration, evaluation, reports and benches behind the `hingecast` binary.
+
+pub mod config;
+pub mod eval;
+pub mod failure;
+pub mod pipeline;
+pub mod report;
+pub mod run;
+pub mod stage;
+pub mod ui;

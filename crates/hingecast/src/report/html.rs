@@ -1,0 +1,140 @@
+//! The page: plain HTML with its style inside, readable without scripts.
+
+use super::{Content, draw::PALETTE};
+use crate::stage::RunFolder;
+use hingecast_geom::JointKind;
+use std::fmt::Write as _;
+
+const STYLE: &str = "
+body{font:15px/1.5 system-ui,sans-serif;margin:2rem auto;max-width:1100px;padding:0 1rem;color:#222}
+h1{font-size:1.5rem}h2{font-size:1.15rem;margin-top:2rem}
+table{border-collapse:collapse}td,th{padding:.25rem .7rem;text-align:left;border-bottom:1px solid #ddd}
+td.n{text-align:right;font-variant-numeric:tabular-nums}
+img{max-width:100%;display:block;margin:.3rem 0}figure{margin:0 0 1rem}figcaption{color:#555;font-size:.9rem}
+.doubts{background:#fff4e0;border-left:4px solid #e69f00;padding:.6rem 1rem}
+.fine{background:#e9f6ec;border-left:4px solid #009e73;padding:.6rem 1rem}
+.chip{display:inline-block;width:.9em;height:.9em;border-radius:2px;margin-right:.4em;vertical-align:-.1em}
+code{background:#f4f4f4;padding:0 .25em}";
+
+pub(crate) fn page(run: &RunFolder, content: &Content) -> String {
+    let twin = &content.twin;
+    let mut out = format!(
+        "<!doctype html><html lang=\"en\"><meta charset=\"utf-8\"><title>{0}</title><style>{STYLE}</style><h1>{0}</h1>",
+        escape(&twin.name)
+    );
+    doubts(&mut out, &run.record.doubts);
+    let _ = write!(out, "<h2>Parts and axes on the photos</h2>");
+    for (file, caption) in &content.overlays {
+        let _ = write!(out, "<figure><img src=\"{file}\" alt=\"{caption}\"><figcaption>{caption}</figcaption></figure>");
+    }
+    joints(&mut out, content);
+    let _ = write!(out, "<h2>Joint values per state</h2>{}", content.plot);
+    parts(&mut out, content);
+    let _ = write!(out, "<h2>Held-out pictures: photo, twin, difference x 4</h2>");
+    if content.held_out.is_empty() {
+        let _ = write!(out, "<p>The recording names no test frames (<code>test_filenames</code>).</p>");
+    }
+    for h in &content.held_out {
+        let _ = write!(
+            out,
+            "<figure><img src=\"{}\" alt=\"held-out view\"><figcaption>state {}, PSNR {:.1} dB</figcaption></figure>",
+            h.file, h.state, h.psnr
+        );
+    }
+    time(&mut out, run);
+    out + "</html>\n"
+}
+
+fn doubts(out: &mut String, doubts: &[String]) {
+    if doubts.is_empty() {
+        let _ = write!(out, "<div class=\"fine\">No doubts were found. That is not proof: look at the pictures.</div>");
+        return;
+    }
+    let _ = write!(out, "<div class=\"doubts\"><b>Doubts</b><ul>");
+    for d in doubts {
+        let _ = write!(out, "<li>{}</li>", escape(d));
+    }
+    let _ = write!(out, "</ul></div>");
+}
+
+fn chip(part: usize) -> String {
+    let [r, g, b] = PALETTE[part % PALETTE.len()];
+    format!("<span class=\"chip\" style=\"background:rgb({r},{g},{b})\"></span>")
+}
+
+fn joints(out: &mut String, content: &Content) {
+    let tree = &content.twin.tree;
+    let _ = write!(
+        out,
+        "<h2>Joints</h2><table><tr><th>joint</th><th>type</th><th>carries</th><th>on</th><th>axis</th><th>pivot</th><th>range seen</th></tr>"
+    );
+    for j in &tree.joints {
+        let range = match j.screw.kind {
+            JointKind::Fixed => "-".to_string(),
+            JointKind::Prismatic => format!("{:.4} .. {:.4}", j.limits[0], j.limits[1]),
+            _ => format!("{:.1} .. {:.1} deg", j.limits[0].to_degrees(), j.limits[1].to_degrees()),
+        };
+        let (a, p) = (j.screw.axis, j.screw.pivot);
+        let pivot = if j.screw.kind.turns() { format!("{:.4} {:.4} {:.4}", p.x, p.y, p.z) } else { "-".into() };
+        let _ = write!(
+            out,
+            "<tr><td>{}</td><td>{:?}</td><td>{}{}</td><td>{}</td><td>{:.4} {:.4} {:.4}</td><td>{pivot}</td><td>{range}</td></tr>",
+            escape(&j.name),
+            j.screw.kind,
+            chip(j.child),
+            escape(&tree.parts[j.child]),
+            escape(&tree.parts[j.parent]),
+            a.x,
+            a.y,
+            a.z
+        );
+    }
+    let _ = write!(out, "</table>");
+}
+
+fn parts(out: &mut String, content: &Content) {
+    let _ = write!(
+        out,
+        "<h2>Parts</h2><table><tr><th>part</th><th>faces</th><th>hulls</th><th>volume</th><th>mass</th><th>closed</th></tr>"
+    );
+    for (i, p) in content.twin.parts.iter().enumerate() {
+        let _ = write!(
+            out,
+            "<tr><td>{}{}</td><td class=n>{}</td><td class=n>{}</td><td class=n>{:.6}</td><td class=n>{:.3}</td><td>{}</td></tr>",
+            chip(i),
+            escape(&p.name),
+            p.faces,
+            p.collision.len(),
+            p.volume,
+            p.mass,
+            if p.open_edges == 0 { "yes".to_string() } else { format!("{} open edges", p.open_edges) }
+        );
+    }
+    let _ = write!(out, "</table>");
+}
+
+fn time(out: &mut String, run: &RunFolder) {
+    let _ = write!(out, "<h2>Time and memory</h2><table><tr><th>stage</th><th>seconds</th><th>peak memory so far</th></tr>");
+    for s in &run.record.stages {
+        let _ = write!(
+            out,
+            "<tr><td>{}</td><td class=n>{:.1}</td><td class=n>{:.2} GB</td></tr>",
+            s.name,
+            s.secs,
+            s.peak_memory as f64 / 1e9
+        );
+    }
+    let _ = write!(
+        out,
+        "<tr><td>all</td><td class=n>{:.1}</td><td class=n>{:.2} GB</td></tr></table><p>{} threads, hingecast {}, recording <code>{}</code></p>",
+        run.record.total_secs(),
+        run.record.peak_memory() as f64 / 1e9,
+        run.record.threads,
+        escape(&run.record.version),
+        escape(&run.record.recording.display().to_string())
+    );
+}
+
+fn escape(text: &str) -> String {
+    text.replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;").replace('"', "&quot;")
+}

@@ -1,0 +1,141 @@
+//! `report/index.html`: doubts first, then pictures, joints, time. One folder, no network.
+
+pub mod draw;
+mod html;
+mod plot;
+
+use crate::failure::{Failure, Result};
+use crate::pipeline::labels::Labeller;
+use crate::pipeline::{joints, splat};
+use crate::run::TwinFile;
+use crate::stage::{RunFolder, read_json};
+use glam::{DVec3, Vec3};
+use hingecast_capture::{Recording, Split, ViewCache};
+use hingecast_geom::KinematicTree;
+use hingecast_splat::metrics;
+use image::RgbImage;
+use std::path::{Path, PathBuf};
+
+/// One held-out picture: file, PSNR.
+pub(crate) struct HeldOut {
+    pub file: String,
+    pub state: usize,
+    pub psnr: f64,
+}
+
+pub(crate) struct Content {
+    pub twin: TwinFile,
+    /// Rows of photos with parts and axes; file, caption.
+    pub overlays: Vec<(String, String)>,
+    pub held_out: Vec<HeldOut>,
+    pub plot: String,
+}
+
+/// Writes the report of a finished run; answers the path of `index.html`.
+///
+/// # Errors
+/// When the run is unfinished or its recording is gone.
+pub fn write(run: &RunFolder) -> Result<PathBuf> {
+    let folder = run.folder("report");
+    std::fs::create_dir_all(&folder).map_err(Failure::io(&folder))?;
+    let twin: TwinFile = read_json(&run.folder("twin").join("twin.json"))?;
+    let recording = Recording::open(&run.record.recording)?;
+    let (gaussians, extent) = splat::load(&run.root)?;
+    let found = joints::load(&run.root)?;
+    let cache = ViewCache::new(&recording, 64 << 20);
+    let background = splat::background(&recording, &cache)?.0;
+    let mut labeller = Labeller::new(&gaussians, &found.labels, found.tree.parts.len(), run.record.threads.max(1))?;
+    let centres = part_centres(&gaussians.means, &found.labels, found.tree.parts.len());
+
+    // First, middle and last state from three sides that are far from each other.
+    let n = recording.n_states;
+    let mut states = vec![0, n / 2, n - 1];
+    states.dedup();
+    let mut overlays = Vec::new();
+    for &state in &states {
+        let q = found.tree.values_at(state);
+        labeller.pose(&found.tree, &q)?;
+        let frames = spread(&recording, state, 4);
+        let mut tiles = Vec::new();
+        for f in frames {
+            let view = recording.load(f)?;
+            let picture = labeller.render(&view.camera, background)?;
+            let mut image = draw::from_rgb8(&view.rgb, view.camera.width, view.camera.height);
+            draw::color_parts(&mut image, &picture.parts);
+            draw_axes(&mut image, &view.camera, &found.tree, &q, &centres, extent.diagonal);
+            tiles.push(image);
+        }
+        let file = format!("state_{state:03}.png");
+        save(&folder, &file, &draw::row(&tiles))?;
+        overlays.push((file, format!("state {state}")));
+    }
+
+    // Held-out cameras of these states: photo, twin, difference.
+    let mut held_out = Vec::new();
+    for &state in &states {
+        labeller.pose(&found.tree, &found.tree.values_at(state))?;
+        for f in recording.frames_of(state, Split::Test).into_iter().take(2) {
+            let view = recording.load(f)?;
+            let (w, h) = (view.camera.width, view.camera.height);
+            let picture = labeller.render(&view.camera, background)?;
+            let photo = draw::from_rgb8(&view.rgb, w, h);
+            let twin = draw::from_rgb_f32(&picture.rgb, w, h);
+            let expected: Vec<f32> = view.rgb.iter().map(|c| *c as f32 / 255.0).collect();
+            let file = format!("held_out_{f:05}.png");
+            let difference = draw::difference(&photo, &twin);
+            save(&folder, &file, &draw::row(&[photo, twin, difference]))?;
+            held_out.push(HeldOut { file, state, psnr: metrics::psnr(&picture.rgb, &expected) });
+        }
+    }
+    let plot = plot::joint_values(&twin.tree, extent.diagonal);
+    let content = Content { twin, overlays, held_out, plot };
+    let path = folder.join("index.html");
+    let text = html::page(run, &content);
+    hingecast_geom::ply::write_whole(&path, text.as_bytes()).map_err(Failure::io(&path))?;
+    Ok(path)
+}
+
+fn save(folder: &Path, file: &str, image: &RgbImage) -> Result<()> {
+    let path = folder.join(file);
+    image.save(&path).map_err(Failure::io(&path))
+}
+
+/// `count` frames of a state whose cameras are far apart (farthest-point choice).
+fn spread(recording: &Recording, state: usize, count: usize) -> Vec<usize> {
+    let frames = recording.frames_of(state, Split::Train);
+    let Some(&first) = frames.first() else { return Vec::new() };
+    let centre = |f: usize| recording.frames[f].camera.centre();
+    let mut chosen = vec![first];
+    while chosen.len() < count.min(frames.len()) {
+        let away = |f: &usize| chosen.iter().map(|c| centre(*c).distance(centre(*f))).fold(f64::INFINITY, f64::min);
+        let next = frames.iter().max_by(|a, b| away(a).total_cmp(&away(b))).expect("not empty");
+        chosen.push(*next);
+    }
+    chosen
+}
+
+fn part_centres(means: &[[f32; 3]], labels: &[u8], n_parts: usize) -> Vec<DVec3> {
+    let mut sums = vec![(DVec3::ZERO, 0.0); n_parts];
+    for (m, l) in means.iter().zip(labels) {
+        sums[*l as usize].0 += Vec3::from(*m).as_dvec3();
+        sums[*l as usize].1 += 1.0;
+    }
+    sums.into_iter().map(|(s, n)| if n > 0.0 { s / n } else { DVec3::ZERO }).collect()
+}
+
+fn draw_axes(
+    image: &mut RgbImage,
+    camera: &hingecast_geom::Camera,
+    tree: &KinematicTree,
+    q: &[f64],
+    centres: &[DVec3],
+    diagonal: f64,
+) {
+    let poses = tree.poses(q);
+    for joint in &tree.joints {
+        let screw = joint.screw.transformed(&poses[joint.parent]);
+        let centre = poses[joint.child].apply(centres[joint.child]);
+        let color = draw::PALETTE[joint.child % draw::PALETTE.len()];
+        draw::draw_axis(image, camera, &screw, centre, 0.5 * diagonal, color);
+    }
+}

@@ -1,0 +1,128 @@
+//! `hingecast bench`: a suite of objects through the whole path.
+
+use super::{Outcome, Session, build, synth, table};
+use crate::cli::Bench;
+use hingecast::eval::{Evaluation, evaluate};
+use hingecast::failure::{Failure, Result};
+use hingecast::pipeline::{self, Span};
+use hingecast::report;
+use hingecast::stage::{read_json, write_json};
+use hingecast_capture::Truth;
+use hingecast_capture::object::ArticulatedObject;
+use std::path::{Path, PathBuf};
+
+/// Object names of the suites, sorted.
+fn objects(suite: &[String]) -> Result<Vec<String>> {
+    let mut out = Vec::new();
+    for name in suite {
+        match name.as_str() {
+            "ours" => out.extend(listed(&ours()?)),
+            "real" => out.extend(real()?),
+            "all" => {
+                out.extend(listed(&ours()?));
+                out.extend(real().unwrap_or_default());
+            }
+            object => out.push(object.to_string()),
+        }
+    }
+    Ok(out)
+}
+
+fn ours() -> Result<PathBuf> {
+    let box_file = ArticulatedObject::resolve("hinged_box")?;
+    let folder = if box_file.is_dir() { box_file } else { box_file.parent().unwrap_or(Path::new(".")).to_path_buf() };
+    Ok(folder.parent().unwrap_or(Path::new(".")).to_path_buf())
+}
+
+fn real() -> Result<Vec<String>> {
+    let hint = "set HINGECAST_DATA to the folder that holds partnet-mobility-dev";
+    let data = std::env::var("HINGECAST_DATA").map_err(|_| Failure::new("no real objects", "HINGECAST_DATA", hint))?;
+    Ok(listed(&Path::new(&data).join("partnet-mobility-dev")))
+}
+
+fn listed(folder: &Path) -> Vec<String> {
+    let entries = std::fs::read_dir(folder).into_iter().flatten().flatten();
+    let mut names: Vec<String> =
+        entries.filter(|e| e.path().is_dir()).map(|e| e.file_name().to_string_lossy().into_owned()).collect();
+    names.sort();
+    names
+}
+
+pub fn run(session: &Session, args: &Bench) -> Result<Outcome> {
+    let names = objects(&args.suite)?;
+    let synth_config = synth::config(&args.synth, true)?;
+    let build_config = build::config(&args.build)?;
+    let mut evaluations: Vec<Evaluation> = Vec::new();
+    for name in &names {
+        session.ui.say(&format!("== {name}"));
+        let (recording, run) = (args.out.join("recordings").join(name), args.out.join("runs").join(name));
+        match one(session, name, &recording, &run, &synth_config, &build_config) {
+            Ok(evaluation) => {
+                session.ui.say(&table::detail(&evaluation));
+                evaluations.push(evaluation);
+            }
+            Err(failure) if failure.cancelled => return Err(failure),
+            // One broken object must not hide the others' figures.
+            Err(failure) => session.ui.say(&format!("error: {failure}")),
+        }
+        if args.tidy {
+            let _ = std::fs::remove_dir_all(&recording);
+        }
+    }
+    let text = table::overview(&evaluations);
+    session.ui.say(&format!("\n{text}"));
+    write_json(&args.out.join("bench.json"), &evaluations)?;
+    let path = args.out.join("bench.md");
+    std::fs::write(&path, &text).map_err(Failure::io(&path))?;
+    session.answer(&evaluations);
+    let mut outcome = if evaluations.len() < names.len() { Outcome::UnderBar } else { Outcome::Done };
+    if let Some(baseline) = &args.against {
+        let worse = compare(&read_json::<Vec<Evaluation>>(baseline)?, &evaluations);
+        worse.iter().for_each(|w| session.ui.say(&format!("worse: {w}")));
+        if !worse.is_empty() {
+            outcome = Outcome::UnderBar;
+        }
+    }
+    Ok(outcome)
+}
+
+fn one(
+    session: &Session,
+    name: &str,
+    recording: &Path,
+    run: &Path,
+    synth_config: &hingecast_capture::synth::SynthConfig,
+    build_config: &hingecast::config::Config,
+) -> Result<Evaluation> {
+    if !recording.join("transforms.json").exists() {
+        synth::record(session, name, synth_config, recording)?;
+    }
+    let folder = pipeline::build(recording, run, build_config, session.threads, &Span::default(), &session.ui)?;
+    report::write(&folder)?;
+    evaluate(run, &Truth::folder_of(recording), &session.ui.stage("eval"))
+}
+
+/// What got clearly worse: beyond the spread between seeds, not beyond the last digit.
+fn compare(before: &[Evaluation], now: &[Evaluation]) -> Vec<String> {
+    let mut out = Vec::new();
+    for b in before {
+        let Some(n) = now.iter().find(|n| n.object == b.object) else { continue };
+        let mut check = |what: &str, old: f64, new: f64, slack: f64| {
+            if !(new <= old * 1.25 + slack) {
+                out.push(format!("{}: {what} {old:.4} -> {new:.4}", b.object));
+            }
+        };
+        check("axis deg", b.axis_max(), n.axis_max(), 0.05);
+        check("pivot", b.pivot_max().unwrap_or(0.0), n.pivot_max().unwrap_or(0.0), 0.001);
+        check("depth MAE", b.first_state.depth_mae, n.first_state.depth_mae, 0.0);
+        check("seconds", b.build_secs, n.build_secs, 5.0);
+        check("memory GB", b.peak_memory_gb, n.peak_memory_gb, 0.1);
+        if n.first_state.psnr < b.first_state.psnr - 0.5 {
+            out.push(format!("{}: PSNR {:.2} -> {:.2}", b.object, b.first_state.psnr, n.first_state.psnr));
+        }
+        if b.parts_right() && !n.parts_right() {
+            out.push(format!("{}: part count {} -> {}", b.object, b.found_parts, n.found_parts));
+        }
+    }
+    out
+}

@@ -1,0 +1,29 @@
+//! `hingecast demo`: record, build, evaluate, report, in one go and a few minutes.
+
+use super::{Outcome, Session, synth, table};
+use crate::cli::Demo;
+use hingecast::config::{Config, Preset};
+use hingecast::eval::evaluate;
+use hingecast::failure::Result;
+use hingecast::pipeline::{self, Span};
+use hingecast::report;
+use hingecast_capture::Truth;
+use hingecast_capture::synth::SynthConfig;
+
+pub fn run(session: &Session, args: &Demo) -> Result<Outcome> {
+    let (recording, run) = (args.out.join("recording"), args.out.join("run"));
+    if !recording.join("transforms.json").exists() {
+        let config = SynthConfig { states: 12, views: 40, size: 192, ..Default::default() };
+        synth::record(session, &args.object, &config, &recording)?;
+    }
+    let config = Config::preset(Preset::Fast);
+    let folder = pipeline::build(&recording, &run, &config, session.threads, &Span::default(), &session.ui)?;
+    let page = report::write(&folder)?;
+    let evaluation = evaluate(&run, &Truth::folder_of(&recording), &session.ui.stage("eval"))?;
+    session.ui.say(&format!("\n{}", table::detail(&evaluation)));
+    let twin = folder.folder("twin");
+    session.ui.say(&format!("\nreport: {}\ntwin:   {}", page.display(), twin.display()));
+    session.ui.say(&format!("look:   python -m mujoco.viewer --mjcf={}", twin.join("robot.xml").display()));
+    session.answer(&evaluation);
+    Ok(Outcome::Done)
+}

@@ -1,0 +1,61 @@
+//! One file per verb; each answers an [`Outcome`].
+
+mod bench;
+mod build;
+mod check;
+mod demo;
+mod doctor;
+mod eval;
+mod import;
+mod synth;
+mod table;
+
+use crate::cli::{Cli, Verb};
+use hingecast::failure::Result;
+use hingecast::ui::Ui;
+use hingecast::{report, stage::RunFolder};
+
+pub enum Outcome {
+    Done,
+    /// A bar that was asked for was missed.
+    UnderBar,
+}
+
+/// What every verb gets besides its own flags.
+pub struct Session {
+    pub ui: Ui,
+    pub json: bool,
+    pub threads: usize,
+}
+
+impl Session {
+    /// The machine's answer, when it was asked for.
+    pub fn answer(&self, value: &impl serde::Serialize) {
+        if self.json {
+            println!("{}", serde_json::to_string(value).expect("plain data"));
+        }
+    }
+}
+
+pub fn run(cli: &Cli) -> Result<Outcome> {
+    let threads = cli.threads.unwrap_or_else(|| std::thread::available_parallelism().map_or(2, |n| n.get())).max(1);
+    // Fails only when a pool is there already: then that one serves.
+    let _ = rayon::ThreadPoolBuilder::new().num_threads(threads).build_global();
+    let session = Session { ui: Ui::new(cli.quiet), json: cli.json, threads };
+    match &cli.verb {
+        Verb::Demo(args) => demo::run(&session, args),
+        Verb::Synth(args) => synth::run(&session, args),
+        Verb::Import(args) => import::run(&session, args),
+        Verb::Check(args) => check::run(&session, args),
+        Verb::Build(args) => build::run(&session, args),
+        Verb::Eval(args) => eval::run(&session, args),
+        Verb::Bench(args) => bench::run(&session, args),
+        Verb::Report(args) => {
+            let path = report::write(&RunFolder::open(&args.run)?)?;
+            session.ui.say(&format!("report: {}", path.display()));
+            session.answer(&serde_json::json!({ "report": path }));
+            Ok(Outcome::Done)
+        }
+        Verb::Doctor => doctor::run(&session),
+    }
+}

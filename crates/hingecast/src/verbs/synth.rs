@@ -1,0 +1,52 @@
+//! `hingecast synth`
+
+use super::{Outcome, Session};
+use crate::cli::{Synth, SynthSettings};
+use hingecast::failure::{Failure, Result};
+use hingecast_capture::object::ArticulatedObject;
+use hingecast_capture::synth::{SynthConfig, SynthReport, synth};
+use std::collections::BTreeMap;
+use std::path::Path;
+
+pub fn config(settings: &SynthSettings, truth: bool) -> Result<SynthConfig> {
+    let mut ranges = BTreeMap::new();
+    for text in &settings.ranges {
+        let parsed = text.split_once('=').and_then(|(name, range)| {
+            let (from, to) = range.split_once(':')?;
+            Some((name.to_string(), [from.parse().ok()?, to.parse().ok()?]))
+        });
+        let (name, range) = parsed.ok_or_else(|| {
+            Failure::new(format!("'{text}' is not JOINT=FROM:TO"), "--range", "for instance --range hinge=0:1.57 (radians)")
+        })?;
+        ranges.insert(name, range);
+    }
+    Ok(SynthConfig {
+        states: settings.states,
+        views: settings.views,
+        test_views: settings.test_views,
+        size: settings.size,
+        ranges,
+        truth,
+        seed: settings.seed,
+        ..Default::default()
+    })
+}
+
+pub fn record(session: &Session, object: &str, config: &SynthConfig, out: &Path) -> Result<SynthReport> {
+    let object = ArticulatedObject::load(&ArticulatedObject::resolve(object)?)?;
+    Ok(synth(&object, config, out, &session.ui.stage("record"))?)
+}
+
+pub fn run(session: &Session, args: &Synth) -> Result<Outcome> {
+    let start = std::time::Instant::now();
+    let report = record(session, &args.object, &config(&args.settings, !args.no_truth)?, &args.out)?;
+    let secs = start.elapsed().as_secs_f64();
+    session.ui.say(&format!("{} images in {secs:.1} s -> {}", report.frames, report.recording.display()));
+    for (name, [from, to]) in &report.ranges {
+        session.ui.say(&format!("  {name}: {from:.3} .. {to:.3}"));
+    }
+    session.answer(&serde_json::json!({
+        "recording": report.recording, "truth": report.truth, "images": report.frames, "secs": secs,
+    }));
+    Ok(Outcome::Done)
+}
