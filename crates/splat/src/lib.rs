@@ -21,6 +21,7 @@ mod pool;
 mod project;
 mod project_backward;
 mod raster;
+pub mod reference;
 mod simd;
 mod ssim;
 mod target;
