@@ -96,9 +96,14 @@ fn main() {
     }
     let (config, rates) = (LossConfig::default(), Rates { means: 1e-4, ..Rates::default() });
 
-    println!("{N} gaussians, {SIZE} x {SIZE}, {threads} threads; ms (median), and how often faster than the scalar twin");
+    println!(
+        "{N} gaussians, {SIZE} x {SIZE}, {threads} threads; ms (median), and how often faster than the scalar twin"
+    );
     let slow = measure_reference(&start, &cameras, &targets, &config, threads);
-    println!("{:<10} forward {:6.2}        backward {:6.2}        iteration {:6.2}", "scalar", slow[0], slow[1], slow[2]);
+    println!(
+        "{:<10} forward {:6.2}        backward {:6.2}        iteration {:6.2}",
+        "scalar", slow[0], slow[1], slow[2]
+    );
     for simd in Simd::available() {
         let fast = measure_engine(&start, simd, threads, &cameras, &targets, &config, &rates);
         println!(

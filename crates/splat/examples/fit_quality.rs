@@ -167,20 +167,25 @@ fn main() {
 }
 
 fn report(when: &str, engine: &mut Engine, views: &[(Camera, Truth)], diagonal: f64) {
-    let (mut psnr, mut ssim, mut depth, mut iou) = (0.0, 0.0, 0.0, 0.0);
+    let (mut psnr, mut ssim, mut depth, mut bias, mut iou) = (0.0, 0.0, 0.0, 0.0, 0.0);
     for (camera, truth) in views {
-        let r = engine.render(camera, &RenderOptions { background: BACKGROUND, ..Default::default() }).expect("a camera");
+        let r =
+            engine.render(camera, &RenderOptions { background: BACKGROUND, ..Default::default() }).expect("a camera");
         psnr += metrics::psnr(&r.rgb, &truth.rgb);
         ssim += metrics::ssim(&r.rgb, &truth.rgb, SIZE, SIZE);
-        depth += metrics::depth_mae(&r.depth_normalised(), &truth.depth).unwrap_or(f64::NAN);
+        let z = r.depth_normalised();
+        depth += metrics::depth_mae(&z, &truth.depth).unwrap_or(f64::NAN);
+        let both = || z.iter().zip(&truth.depth).filter(|(a, b)| **a > 0.0 && **b > 0.0);
+        bias += both().map(|(a, b)| f64::from(a - b)).sum::<f64>() / both().count() as f64;
         iou += metrics::mask_iou(&r.alpha, &truth.mask);
     }
     let n = views.len() as f64;
     println!(
-        "{when}: held-out psnr {:.2} dB, ssim {:.4}, depth error {:.3} % of the diagonal, mask iou {:.4}",
+        "{when}: held-out psnr {:.2} dB, ssim {:.4}, depth error {:.3} % of the diagonal (bias {:+.3} %), mask iou {:.4}",
         psnr / n,
         ssim / n,
         100.0 * depth / n / diagonal,
+        100.0 * bias / n / diagonal,
         iou / n
     );
 }

@@ -44,7 +44,7 @@ pub fn save(engine: &Engine, checkpoint: &Checkpoint, path: &Path) -> Result<(),
         header[*name] = json!({ "dtype": "F32", "shape": [count, len], "data_offsets": [k * bytes, (k + 1) * bytes] });
     }
     let mut text = header.to_string();
-    while text.len() % 8 != 0 {
+    while !text.len().is_multiple_of(8) {
         text.push(' ');
     }
     let mut out = Vec::with_capacity(8 + text.len() + 3 * bytes);

@@ -41,7 +41,7 @@ pub(crate) fn relocate(
         .opacities()
         .iter()
         .enumerate()
-        .filter(|(i, o)| !(**o >= DEAD_OPACITY) || never_seen(*i))
+        .filter(|(i, o)| **o < DEAD_OPACITY || o.is_nan() || never_seen(*i))
         .map(|(i, _)| i)
         .collect();
     dead.truncate(most);
@@ -97,9 +97,8 @@ fn add_places(
         }
         cumulative.push(total);
     }
-    if !(total > 0.0) {
-        return Ok(());
-    }
+    // Nothing to gain here, or nothing known.
+    let count = if total > 0.0 { count } else { 0 };
     for _ in 0..count {
         let wanted = rng.f64() * total;
         let i = cumulative.partition_point(|c| *c <= wanted).min(depth.len() - 1);

@@ -35,7 +35,8 @@ impl Target {
         };
         let (rgb, (depth, mask)) = (self.rgb(), self.depth_and_mask());
         let mut small_rgb = vec![0f32; 3 * w * h];
-        let (mut small_depth, mut small_mask, mut small_weight) = (vec![0f32; w * h], vec![0f32; w * h], vec![0f32; w * h]);
+        let (mut small_depth, mut small_mask, mut small_weight) =
+            (vec![0f32; w * h], vec![0f32; w * h], vec![0f32; w * h]);
         for y in 0..h {
             for x in 0..w {
                 let four = [(0, 0), (1, 0), (0, 1), (1, 1)].map(|(u, v)| (2 * y + v) * full.width + 2 * x + u);

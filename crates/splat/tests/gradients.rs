@@ -29,7 +29,8 @@ fn check_parameter(
     analytic: &dyn Fn(usize, usize) -> f64,
     value: &dyn Fn(&Gaussians) -> f64,
 ) {
-    let largest = (0..N).flat_map(|i| (0..width).map(move |k| (i, k))).fold(0f64, |m, (i, k)| m.max(analytic(i, k).abs()));
+    let largest =
+        (0..N).flat_map(|i| (0..width).map(move |k| (i, k))).fold(0f64, |m, (i, k)| m.max(analytic(i, k).abs()));
     assert!(largest > 0.0, "{name}: no gradient at all");
     let mut work = g.clone();
     for i in 0..N {

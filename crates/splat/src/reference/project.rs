@@ -97,10 +97,8 @@ impl Screen {
         let x = camera.camera_from_world.apply(world.mean);
         let (width, height) = (camera.width as Real, camera.height as Real);
         let mean = [camera.fx * x.x / x.z + camera.cx, camera.fy * x.y / x.z + camera.cy];
-        let near_frame = mean[0] > -0.5 * width
-            && mean[0] < 1.5 * width
-            && mean[1] > -0.5 * height
-            && mean[1] < 1.5 * height;
+        let near_frame =
+            mean[0] > -0.5 * width && mean[0] < 1.5 * width && mean[1] > -0.5 * height && mean[1] < 1.5 * height;
         let opacity = 1.0 / (1.0 + Real::from(-scene.gaussians.opacities[i]).exp());
         let reach2 = 2.0 * (255.0 * opacity).ln();
         if x.z <= Real::from(NEAR) || !near_frame || reach2 <= 0.0 {
