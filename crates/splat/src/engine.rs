@@ -225,9 +225,7 @@ impl Engine {
         let b = &self.buffers;
         let (w, h) = (camera.width, camera.height);
         let (stride, plane_len) = (b.view.stride(), b.view.plane_len());
-        let plane = |k: usize| {
-            (0..h).flat_map(move |y| &b.image[k * plane_len + y * stride..][..w]).copied()
-        };
+        let plane = |k: usize| (0..h).flat_map(move |y| &b.image[k * plane_len + y * stride..][..w]).copied();
         let mut rgb = vec![0f32; 3 * w * h];
         for c in 0..3 {
             for (to, v) in rgb[c..].iter_mut().step_by(3).zip(plane(c)) {
@@ -351,7 +349,8 @@ impl Engine {
             for y in 0..h {
                 for x in 0..w {
                     let i = y * w + x;
-                    plane[y * stride + x] = if interleave > 1 { values[i * interleave + k] } else { values[k * w * h + i] };
+                    plane[y * stride + x] =
+                        if interleave > 1 { values[i * interleave + k] } else { values[k * w * h + i] };
                 }
             }
         }
@@ -365,7 +364,7 @@ impl Engine {
         let channels = self.buffers.channels;
         gradients.extra.resize(self.params.padded(0).len() * channels, 0.0);
         self.buffers.backward(&mut self.pool, self.kernels);
-        let frames = self.buffers.to_gradients(
+        let frames = self.buffers.pairs_to_gradients(
             &mut self.pool,
             self.kernels,
             &self.params,
@@ -418,7 +417,7 @@ impl Engine {
         self.buffers.backward(&mut self.pool, self.kernels);
         self.rendered = None;
         let adam = self.next_adam(rates);
-        self.buffers.to_adam(&mut self.pool, self.kernels, &mut self.params, &self.groups, adam);
+        self.buffers.pairs_to_adam(&mut self.pool, self.kernels, &mut self.params, &self.groups, adam);
         Ok(terms)
     }
 

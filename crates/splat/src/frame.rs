@@ -7,7 +7,7 @@ use crate::params::Planes;
 use crate::pool::{Pool, Shards};
 use crate::project::{self, CHUNK, PlaneTable, Splat};
 use crate::raster::{self, PLANES};
-use crate::ssim::{self, BAND, Padded, RADIUS};
+use crate::ssim::{self, BAND, Padded};
 use crate::target::Target;
 use crate::view::{FrameGradient, View};
 use crate::{params::plane, project_backward};
@@ -114,7 +114,6 @@ impl FrameBuffers {
                 plane.resize(layout.len(), 0.0);
             }
         }
-        debug_assert!(RADIUS < 16);
         let mut ssim_sums = vec![0f64; 3 * bands];
         if with_ssim {
             let [x0, x1, x2] = &mut self.ssim_x;
@@ -183,7 +182,7 @@ impl FrameBuffers {
     }
 
     /// The pair rows to parameter gradients; returns the sums per group's frame.
-    pub fn to_gradients(
+    pub fn pairs_to_gradients(
         &mut self,
         pool: &mut Pool,
         kernels: &Kernels,
@@ -224,7 +223,14 @@ impl FrameBuffers {
     }
 
     /// The pair rows straight into Adam.
-    pub fn to_adam(&mut self, pool: &mut Pool, kernels: &Kernels, params: &mut Planes, groups: &[u16], adam: crate::adam::Adam) {
+    pub fn pairs_to_adam(
+        &mut self,
+        pool: &mut Pool,
+        kernels: &Kernels,
+        params: &mut Planes,
+        groups: &[u16],
+        adam: crate::adam::Adam,
+    ) {
         let chunks = chunks(params);
         let args = project_backward::Args {
             params: PlaneTable::new(params),

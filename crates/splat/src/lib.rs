@@ -11,26 +11,36 @@
 
 mod adam;
 mod bins;
+pub mod checkpoint;
 mod engine;
 mod error;
+mod fit;
 mod frame;
+mod init;
 mod kernels;
 mod loss;
+pub mod metrics;
 mod params;
 mod pool;
 mod project;
 mod project_backward;
 mod raster;
+pub mod reference;
+mod relocate;
 mod simd;
 mod ssim;
 mod target;
 mod view;
+mod views;
 
 pub use adam::Rates;
 pub use engine::{Engine, Gradients, PixelGradients, Render, RenderOptions};
 pub use error::SplatError;
+pub use fit::{FitConfig, FitReport, fit};
+pub use init::initialise;
 pub use kernels::Simd;
 pub use loss::{DepthLoss, LossConfig, LossTerms};
 pub use params::{Planes, plane};
 pub use raster::MAX_EXTRA;
 pub use target::{Pixels, Target, TargetImages};
+pub use views::Views;

@@ -28,6 +28,8 @@ pub(crate) struct Args<'a> {
     pub output: Output<'a>,
 }
 
+// One value per pass: the size of the variants does not matter.
+#[allow(clippy::large_enum_variant)]
 pub(crate) enum Output<'a> {
     /// Gradients in parameter layout, per chunk and group the frame sums, and extra values (len, channels).
     Gradients {

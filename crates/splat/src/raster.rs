@@ -185,11 +185,8 @@ pub(crate) unsafe fn forward<T: Lanes, const EXTRA: bool>(args: &ForwardArgs, ti
         for block in 0..blocks {
             let mut pixels = [0f32; 16];
             unsafe {
-                let from = if channel < PLANES {
-                    s.add(channel * PIXELS)
-                } else {
-                    e_state.add((channel - PLANES) * PIXELS)
-                };
+                let from =
+                    if channel < PLANES { s.add(channel * PIXELS) } else { e_state.add((channel - PLANES) * PIXELS) };
                 let mut v = T::load_ptr(from.add(block * T::N));
                 if channel < 3 {
                     let t = T::load_ptr(s.add(4 * PIXELS + block * T::N));
@@ -229,8 +226,7 @@ pub(crate) unsafe fn backward<T: Lanes, const EXTRA: bool>(args: &BackwardArgs, 
             ($plane:expr, $channel:expr) => {{
                 let mut pixels = [0f32; 16];
                 for row in 0..T::N / 4 {
-                    let at =
-                        $channel * view.plane_len() + block_row::<T>(view, tile_x, tile_y, block, row);
+                    let at = $channel * view.plane_len() + block_row::<T>(view, tile_x, tile_y, block, row);
                     pixels[4 * row..4 * row + 4].copy_from_slice(&$plane[at..at + 4]);
                 }
                 T::load(&pixels)

@@ -89,8 +89,10 @@ pub(crate) unsafe fn forward<T: Lanes>(
             let (mut a, mut b, mut c) = (T::splat(0.0), T::splat(0.0), T::splat(0.0));
             for k in 0..11 {
                 unsafe {
-                    let xv = T::load_ptr(scratch.x.as_ptr().add(sl.row(row) + x + k * sl.stride() - RADIUS * sl.stride()));
-                    let yv = T::load_ptr(fixed.y.as_ptr().add(fl.row(row) + x + k * fl.stride() - RADIUS * fl.stride()));
+                    let xv =
+                        T::load_ptr(scratch.x.as_ptr().add(sl.row(row) + x + k * sl.stride() - RADIUS * sl.stride()));
+                    let yv =
+                        T::load_ptr(fixed.y.as_ptr().add(fl.row(row) + x + k * fl.stride() - RADIUS * fl.stride()));
                     let gx = T::splat(WINDOW[k]) * xv;
                     a = a + gx;
                     b = gx.fma(xv, b);

@@ -124,11 +124,8 @@ impl Target {
                 let m = mask(i);
                 for c in 0..3 {
                     let seen = images.rgb.at(3 * i + c);
-                    rgb[c][layout.row(y) + x] = if images.shows_background {
-                        seen
-                    } else {
-                        m * seen + (1.0 - m) * images.background[c]
-                    };
+                    rgb[c][layout.row(y) + x] =
+                        if images.shows_background { seen } else { m * seen + (1.0 - m) * images.background[c] };
                 }
                 alpha[y * padded + x] = m;
                 alpha_weight[y * padded + x] = if on_edge(&mask, i, w, h) { 0.0 } else { 1.0 };
@@ -217,7 +214,11 @@ fn check_images(images: &TargetImages, pixels: usize) -> Result<(), SplatError> 
         check_len("target.depth", depth.len(), pixels, "camera width x height")?;
         check_finite("target.depth", depth)?;
         if let Some(z) = depth.iter().find(|z| **z < 0.0) {
-            return Err(SplatError::Range { what: "target.depth", value: f64::from(*z), range: "0 (unknown) and above" });
+            return Err(SplatError::Range {
+                what: "target.depth",
+                value: f64::from(*z),
+                range: "0 (unknown) and above",
+            });
         }
     }
     for (what, plane) in [("target.mask", images.mask), ("target.weight", images.weight)] {

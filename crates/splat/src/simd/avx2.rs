@@ -110,10 +110,8 @@ impl Lanes for Avx2 {
         unsafe {
             let bits = _mm256_castps_si256(self.0);
             let e = _mm256_sub_epi32(_mm256_srli_epi32::<23>(bits), _mm256_set1_epi32(127));
-            let m = _mm256_or_si256(
-                _mm256_and_si256(bits, _mm256_set1_epi32(0x007f_ffff)),
-                _mm256_set1_epi32(0x3f80_0000),
-            );
+            let m =
+                _mm256_or_si256(_mm256_and_si256(bits, _mm256_set1_epi32(0x007f_ffff)), _mm256_set1_epi32(0x3f80_0000));
             let (e, m, one) = (Avx2(_mm256_cvtepi32_ps(e)), Avx2(_mm256_castsi256_ps(m)), Self::splat(1.0));
             let t = (m - one) / (m + one);
             let u = t * t;

@@ -1,0 +1,115 @@
+//! Moves gaussians that do nothing to where the picture is wrong. Their number stays fixed.
+
+use crate::engine::{Engine, RenderOptions};
+use crate::error::SplatError;
+use crate::params::plane;
+use crate::target::Target;
+use glam::DVec2;
+use hingecast_geom::gaussians::SH_C0;
+use std::sync::Arc;
+
+/// Opacity below which a gaussian is dead.
+const DEAD_OPACITY: f32 = 0.02;
+/// Errors smaller than this are noise of the pictures, not missing gaussians.
+const NOISE: f32 = 0.03;
+
+/// A place on the surface that the render gets wrong.
+struct Place {
+    position: [f32; 3],
+    colour: [f32; 3],
+    /// Standard deviation of one pixel there, scene units.
+    size: f32,
+}
+
+/// Gives every dead gaussian a new life at a pixel of `targets` chosen with a probability that grows with its error.
+/// Returns how many moved. Engines with groups are left alone: a canonical place needs to know the group.
+///
+/// # Errors
+/// As [`Engine::render`].
+pub(crate) fn relocate(
+    engine: &mut Engine,
+    targets: &[Arc<Target>],
+    most: usize,
+    rng: &mut fastrand::Rng,
+) -> Result<usize, SplatError> {
+    if !engine.groups().is_empty() {
+        return Ok(0);
+    }
+    let (_, second, steps) = engine.moments();
+    let never_seen = |i: usize| steps > 0 && (0..second.count()).all(|k| second.plane(k)[i] == 0.0);
+    let mut dead: Vec<usize> = engine
+        .opacities()
+        .iter()
+        .enumerate()
+        .filter(|(i, o)| **o < DEAD_OPACITY || o.is_nan() || never_seen(*i))
+        .map(|(i, _)| i)
+        .collect();
+    dead.truncate(most);
+    if dead.is_empty() {
+        return Ok(0);
+    }
+    let per_view = dead.len().div_ceil(targets.len());
+    let mut places = Vec::new();
+    for target in targets {
+        add_places(engine, target, per_view, rng, &mut places)?;
+    }
+    let moved = dead.len().min(places.len());
+    let (params, first, second, _) = engine.state_mut();
+    for (&i, place) in dead.iter().zip(&places) {
+        for k in 0..params.count() {
+            first.plane_mut(k)[i] = 0.0;
+            second.plane_mut(k)[i] = 0.0;
+        }
+        params.set(plane::MEANS, i, place.position);
+        params.set(plane::SCALES, i, [place.size.ln(); 3]);
+        params.set(plane::QUATS, i, [1.0, 0.0, 0.0, 0.0]);
+        params.set(plane::OPACITY, i, [0.0]);
+        params.set(plane::SH0, i, place.colour.map(|c| (c - 0.5) / SH_C0));
+        for k in plane::SH1..params.count() {
+            params.plane_mut(k)[i] = 0.0;
+        }
+    }
+    Ok(moved)
+}
+
+/// Draws up to `count` pixels of one view, by error.
+fn add_places(
+    engine: &mut Engine,
+    target: &Target,
+    count: usize,
+    rng: &mut fastrand::Rng,
+    places: &mut Vec<Place>,
+) -> Result<(), SplatError> {
+    let camera = target.camera();
+    let render = engine.render(camera, &RenderOptions { background: target.background(), ..Default::default() })?;
+    let rgb = target.rgb();
+    let (depth, _) = target.depth_and_mask();
+    let seen = render.depth_normalised();
+    // Cumulative error over pixels whose depth is known, by camera or by render.
+    let mut cumulative = Vec::with_capacity(depth.len());
+    let mut total = 0.0f64;
+    for i in 0..depth.len() {
+        let known = depth[i] > 0.0 || seen[i] > 0.0;
+        let error: f32 = (0..3).map(|c| (render.rgb[3 * i + c] - rgb[3 * i + c]).abs()).sum();
+        let weight = target.weight_at(i % camera.width, i / camera.width);
+        if known {
+            total += f64::from((error - NOISE).max(0.0) * weight);
+        }
+        cumulative.push(total);
+    }
+    // Nothing to gain here, or nothing known.
+    let count = if total > 0.0 { count } else { 0 };
+    for _ in 0..count {
+        let wanted = rng.f64() * total;
+        let i = cumulative.partition_point(|c| *c <= wanted).min(depth.len() - 1);
+        let z = if depth[i] > 0.0 { depth[i] } else { seen[i] };
+        let (x, y) = (i % camera.width, i / camera.width);
+        let uv = DVec2::new(x as f64 + rng.f64(), y as f64 + rng.f64());
+        places.push(Place {
+            position: camera.unproject(uv, f64::from(z)).as_vec3().into(),
+            colour: [rgb[3 * i], rgb[3 * i + 1], rgb[3 * i + 2]],
+            size: (0.5 * f64::from(z) / camera.fx) as f32,
+        });
+    }
+    Ok(())
+}
