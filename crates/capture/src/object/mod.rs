@@ -78,14 +78,16 @@ impl ArticulatedObject {
     /// # Errors
     /// When it is nowhere; the hint lists the places.
     pub fn resolve(argument: &str) -> Result<PathBuf, CaptureError> {
+        // A bare name may also be that of a recording made here before: that is no object.
+        let is_object = |p: &PathBuf| p.is_file() || (p.is_dir() && description_in(p).is_ok());
         let path = PathBuf::from(argument);
-        if path.exists() {
+        if is_object(&path) || path.components().count() > 1 && path.exists() {
             return Ok(path);
         }
         let mut places = vec![PathBuf::from("objects")];
         places.extend(std::env::var_os("HINGECAST_OBJECTS").map(PathBuf::from));
         places.extend(std::env::var_os("HINGECAST_DATA").map(|d| PathBuf::from(d).join("partnet-mobility-dev")));
-        if let Some(found) = places.iter().map(|p| p.join(argument)).find(|p| p.exists()) {
+        if let Some(found) = places.iter().map(|p| p.join(argument)).find(is_object) {
             return Ok(found);
         }
         let listed: Vec<String> = places.iter().map(|p| p.display().to_string()).collect();
