@@ -3,15 +3,18 @@
 //! Geometry stands in the world frame (z up) with every joint at 0, the canonical configuration, as the tree's screws do.
 
 mod mesh_file;
+mod mjcf;
 pub(crate) mod shapes;
 pub(crate) mod texture;
 mod urdf;
+mod xml;
 
 pub use texture::Texture;
 
 use crate::CaptureError;
 use glam::{DVec3, Vec2, Vec3};
 use hingecast_geom::{KinematicTree, Pose, TriMesh};
+use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 /// An object with joints. `tree.parts[i]` names `parts[i]`; the joints' `values` are empty.
@@ -64,6 +67,7 @@ impl ArticulatedObject {
         })?;
         match xml.root_element().tag_name().name() {
             "robot" => urdf::load(&file, &xml),
+            "mujoco" => mjcf::load(&file, &xml),
             other => Err(CaptureError::new(
                 format!("the object file starts with <{other}>; <robot> (URDF) or <mujoco> (MJCF) is expected"),
                 file.display().to_string(),
@@ -78,14 +82,16 @@ impl ArticulatedObject {
     /// # Errors
     /// When it is nowhere; the hint lists the places.
     pub fn resolve(argument: &str) -> Result<PathBuf, CaptureError> {
+        // A bare name may also be that of a recording made here before: that is no object.
+        let is_object = |p: &PathBuf| p.is_file() || (p.is_dir() && description_in(p).is_ok());
         let path = PathBuf::from(argument);
-        if path.exists() {
+        if is_object(&path) || path.components().count() > 1 && path.exists() {
             return Ok(path);
         }
         let mut places = vec![PathBuf::from("objects")];
         places.extend(std::env::var_os("HINGECAST_OBJECTS").map(PathBuf::from));
         places.extend(std::env::var_os("HINGECAST_DATA").map(|d| PathBuf::from(d).join("partnet-mobility-dev")));
-        if let Some(found) = places.iter().map(|p| p.join(argument)).find(|p| p.exists()) {
+        if let Some(found) = places.iter().map(|p| p.join(argument)).find(is_object) {
             return Ok(found);
         }
         let listed: Vec<String> = places.iter().map(|p| p.display().to_string()).collect();
@@ -94,6 +100,39 @@ impl ArticulatedObject {
             format!("looked for a path and in {}", listed.join(", ")),
             "give a path to a URDF or MJCF file or its folder, or set HINGECAST_OBJECTS or HINGECAST_DATA",
         ))
+    }
+
+    /// Names the parts, drops doubled faces, checks the whole. A part is called after its first link that has a name
+    /// of its own in `names` or else is `seen` (has geometry); same names get numbers.
+    fn finish(
+        mut self,
+        library: mesh_file::Library,
+        names: &BTreeMap<String, String>,
+        seen: impl Fn(&str) -> bool,
+    ) -> Result<Self, String> {
+        for part in &mut self.parts {
+            part.drop_duplicate_faces();
+            let link = part.links.iter().find(|l| seen(l)).or(part.links.first());
+            let named = part.links.iter().find_map(|l| names.get(l));
+            let name = named.or(link).cloned().unwrap_or_default().replace(['/', '\\'], "_");
+            let mut unique = name.clone();
+            let mut n = 2;
+            while self.tree.parts.contains(&unique) {
+                unique = format!("{name}_{n}");
+                n += 1;
+            }
+            self.tree.parts.push(unique);
+        }
+        (self.materials, self.textures) = (library.materials, library.textures);
+        self.tree.validate()?;
+        // Labels are 8-bit and 0 is the background.
+        if self.parts.len() > 254 {
+            return Err(format!("the object has {} moving parts, at most 254 are supported", self.parts.len()));
+        }
+        if self.parts.iter().all(|p| p.faces.is_empty()) {
+            return Err("the object has no visible surface".into());
+        }
+        Ok(self)
     }
 
     /// All vertices with the parts at `poses` (world_from_canonical).

@@ -4,10 +4,11 @@
 //! their child into the parent's part, at 0.
 
 use super::mesh_file::Library;
+use super::xml::{Reader, children};
 use super::{ArticulatedObject, PartGeometry};
 use crate::CaptureError;
 use glam::{DMat3, DQuat, DVec3};
-use hingecast_geom::{Joint, JointKind, KinematicTree, Pose, Screw};
+use hingecast_geom::{Joint, JointKind, Pose, Screw};
 use roxmltree::{Document, Node};
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
@@ -98,37 +99,8 @@ pub(super) fn load(file: &Path, xml: &Document) -> Result<ArticulatedObject, Cap
             object.parts[part].append(&geometry, &(pose * origin), scale);
         }
     }
-    for part in &mut object.parts {
-        part.drop_duplicate_faces();
-    }
-    object.tree.parts = part_names(&object.parts, &names);
-    object.materials = library.materials;
-    object.textures = library.textures;
-    finish(object, &reader)
-}
-
-fn finish(object: ArticulatedObject, reader: &Reader) -> Result<ArticulatedObject, CaptureError> {
-    KinematicTree::validate(&object.tree).map_err(|e| reader.error(e, "correct the joints"))?;
-    if object.parts.iter().all(|p| p.faces.is_empty()) {
-        return Err(reader.error("the object has no visible surface", "add <visual> geometry to its links"));
-    }
-    Ok(object)
-}
-
-/// A part is called after its first link that has a name of its own; same names get numbers.
-fn part_names(parts: &[PartGeometry], names: &BTreeMap<String, String>) -> Vec<String> {
-    let mut out: Vec<String> = Vec::new();
-    for part in parts {
-        let name = part.links.iter().find_map(|l| names.get(l)).or(part.links.last()).cloned().unwrap_or_default();
-        let mut unique = name.clone();
-        let mut n = 2;
-        while out.contains(&unique) {
-            unique = format!("{name}_{n}");
-            n += 1;
-        }
-        out.push(unique);
-    }
-    out
+    let seen = |link: &str| links.iter().any(|(n, l)| n == link && children(*l, "visual").next().is_some());
+    object.finish(library, &names, seen).map_err(|e| reader.error(e, "correct the links and joints"))
 }
 
 /// Meanings of PartNet links: semantics.txt ("link_2 hinge lid") where it speaks of these links; in some objects it
@@ -165,36 +137,7 @@ fn minor_joints(folder: &Path, joints: &[UrdfJoint], names: &BTreeMap<String, St
     joints.iter().filter(|j| names.get(&j.child).is_some_and(|n| small(n))).map(|j| j.name.clone()).collect()
 }
 
-struct Reader<'a> {
-    file: &'a Path,
-}
-
 impl Reader<'_> {
-    fn error(&self, what: impl Into<String>, hint: &str) -> CaptureError {
-        CaptureError::new(what, self.file.display().to_string(), hint)
-    }
-
-    /// An error that names the element and its line.
-    fn at(&self, node: Node, what: impl Into<String>, hint: &str) -> CaptureError {
-        let line = node.document().text_pos_at(node.range().start).row;
-        let place = format!("{}:{line}: <{}>", self.file.display(), node.tag_name().name());
-        CaptureError::new(what, place, hint)
-    }
-
-    fn text(&self, node: Node, key: &str) -> Result<String, CaptureError> {
-        let hint = format!("add {key}=\"...\"");
-        node.attribute(key).map(String::from).ok_or_else(|| self.at(node, format!("{key} is missing"), &hint))
-    }
-
-    fn numbers<const N: usize>(&self, node: Node, key: &str) -> Result<Option<[f64; N]>, CaptureError> {
-        let Some(text) = node.attribute(key) else { return Ok(None) };
-        let values: Vec<f64> = text.split_whitespace().filter_map(|w| w.parse().ok()).collect();
-        match <[f64; N]>::try_from(values) {
-            Ok(v) if v.iter().all(|x| x.is_finite()) => Ok(Some(v)),
-            _ => Err(self.at(node, format!("{key}=\"{text}\" should be {N} finite numbers"), "correct the numbers")),
-        }
-    }
-
     /// `<origin xyz rpy>` of an element: rotation about fixed x, then y, then z.
     fn origin(&self, node: Node) -> Result<Pose, CaptureError> {
         let Some(origin) = children(node, "origin").next() else { return Ok(Pose::IDENTITY) };
@@ -307,8 +250,4 @@ impl Reader<'_> {
         };
         Ok((geometry, self.origin(node)?, scale))
     }
-}
-
-fn children<'a, 'i: 'a>(node: Node<'a, 'i>, name: &'static str) -> impl Iterator<Item = Node<'a, 'i>> {
-    node.children().filter(move |n| n.is_element() && n.tag_name().name() == name)
 }

@@ -1,0 +1,81 @@
+//! MJCF objects: frames, joints, shapes, defaults; and the project's own samples when they are there.
+
+use glam::{DQuat, DVec3};
+use hingecast_capture::object::ArticulatedObject;
+use hingecast_geom::JointKind;
+
+const LAMP: &str = r#"<mujoco model="lamp">
+  <compiler angle="degree"/>
+  <default><geom density="300"/><default class="arm"><geom type="capsule" size="0.01" rgba="0.2 0.2 0.2 1"/><joint axis="0 1 0" range="-90 90"/></default></default>
+  <asset><material name="brass" rgba="0.8 0.6 0.2 1"/></asset>
+  <worldbody>
+    <geom type="plane" size="1 1 1"/>
+    <body name="foot" pos="0 0 0.01">
+      <geom type="cylinder" size="0.1 0.01" material="brass"/>
+      <body name="lower" pos="0 0 0.01" childclass="arm">
+        <joint name="shoulder"/>
+        <geom fromto="0 0 0 0 0 0.3"/>
+        <geom type="box" size="1 1 1" group="3"/>
+        <body name="upper" pos="0 0 0.3" quat="0.7071067811865476 0 0.7071067811865476 0">
+          <joint name="elbow" type="slide" axis="0 0 2" range="0 0.1"/>
+          <geom fromto="0 0 0 0 0 0.2"/>
+          <geom type="ellipsoid" size="0.05 0.04 0.03" pos="0 0 0.2" rgba="1 1 1 1"/>
+        </body>
+      </body>
+    </body>
+  </worldbody>
+</mujoco>"#;
+
+fn load(text: &str) -> Result<ArticulatedObject, hingecast_capture::CaptureError> {
+    let dir = tempfile::tempdir().unwrap();
+    let file = dir.path().join("object.xml");
+    std::fs::write(&file, text).unwrap();
+    ArticulatedObject::load(&file)
+}
+
+#[test]
+fn nested_bodies_make_a_chain() {
+    let lamp = load(LAMP).unwrap();
+    assert_eq!(lamp.tree.parts, ["foot", "lower", "upper"]);
+    let [shoulder, elbow] = &lamp.tree.joints[..] else { panic!("{:?}", lamp.tree.joints) };
+    assert_eq!((shoulder.screw.kind, elbow.screw.kind), (JointKind::Revolute, JointKind::Prismatic));
+    assert!((shoulder.limits[1] - 90f64.to_radians()).abs() < 1e-12 && elbow.limits == [0.0, 0.1]);
+    assert!(shoulder.screw.pivot.distance(DVec3::new(0.0, 0.0, 0.02)) < 1e-12);
+    // quat turns z into x: the upper arm lies along world x, and slides along it.
+    assert!(elbow.screw.axis.distance(DVec3::X) < 1e-9, "{}", elbow.screw.axis);
+    assert_eq!((elbow.parent, elbow.child), (1, 2));
+    let (lo, hi) = lamp.bounds(&[0.0, 0.0]);
+    assert!((hi - DVec3::new(0.23, 0.1, 0.37)).abs().max_element() < 1e-3, "{hi}");
+    assert!((lo - DVec3::new(-0.1, -0.1, 0.0)).abs().max_element() < 1e-3, "{lo}");
+    // Shoulder turned by 90 deg about y, slid by 0.1: the head was at (0.2, 0, 0.32).
+    let head = lamp.tree.poses(&[90f64.to_radians(), 0.1])[2].apply(DVec3::new(0.2, 0.0, 0.32));
+    let turned = DQuat::from_rotation_y(90f64.to_radians()) * DVec3::new(0.3, 0.0, 0.3) + DVec3::Z * 0.02;
+    assert!(head.distance(turned) < 1e-9, "{head} {turned}");
+    assert!(lamp.part_mesh(0).colors.iter().all(|c| *c == [204, 153, 51]));
+}
+
+#[test]
+fn mistakes_are_named_with_file_and_line() {
+    for (wrong, right, line) in [
+        ("axis=\"0 0 0\"", "axis=\"0 0 2\"", "object.xml:14"),
+        ("range=\"0.1 0\"", "range=\"0 0.1\"", "object.xml:14"),
+        ("type=\"ball\"", "type=\"slide\"", "object.xml:14"),
+        ("material=\"gold\"", "material=\"brass\"", "object.xml:8"),
+        ("size=\"0.05 x 0.03\"", "size=\"0.05 0.04 0.03\"", "object.xml:16"),
+    ] {
+        let error = load(&LAMP.replace(right, wrong)).unwrap_err().to_string();
+        assert!(error.contains(line) && error.lines().count() == 3, "{wrong}: {error}");
+    }
+    assert!(load("<mujoco><worldbody/></mujoco>").unwrap_err().to_string().contains("no visible surface"));
+    assert!(load("<mujoco><worldbody>").unwrap_err().to_string().contains("not XML"));
+    assert!(load("<sdf/>").unwrap_err().to_string().contains("<sdf>"));
+}
+
+#[test]
+fn our_own_samples_load() {
+    let folder = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("../../objects");
+    for entry in std::fs::read_dir(folder).into_iter().flatten().flatten().filter(|e| e.path().is_dir()) {
+        let object = ArticulatedObject::load(&entry.path()).unwrap_or_else(|e| panic!("{e}"));
+        assert!(!object.tree.joints.is_empty(), "{}", object.name);
+    }
+}
