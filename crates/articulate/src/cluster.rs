@@ -141,10 +141,8 @@ mod tests {
         let labels = kmeans(&rows, 3, 4, 1);
         assert!(same_partition(&labels, &truth));
         assert!(same_partition(&hdbscan(&rows, 20).unwrap(), &truth));
-        let d: Vec<Vec<f32>> = rows
-            .iter()
-            .map(|a| rows.iter().map(|b| squared_distance(a, b).sqrt()).collect())
-            .collect();
+        let d: Vec<Vec<f32>> =
+            rows.iter().map(|a| rows.iter().map(|b| squared_distance(a, b).sqrt()).collect()).collect();
         let two = kmeans(&rows, 2, 4, 1);
         assert!(silhouette(&d, &labels) > silhouette(&d, &two));
         assert!(silhouette(&d, &labels) > 0.8);

@@ -58,8 +58,7 @@ pub fn ransac_line(points: &[DVec3], tolerance: f64, seed: u64) -> Option<(DVec3
     for _ in 0..200 {
         let (a, b) = (points[rng.usize(0..points.len())], points[rng.usize(0..points.len())]);
         let Some(d) = (b - a).try_normalize() else { continue };
-        let close: Vec<usize> =
-            (0..points.len()).filter(|&i| (points[i] - a).cross(d).length() <= tolerance).collect();
+        let close: Vec<usize> = (0..points.len()).filter(|&i| (points[i] - a).cross(d).length() <= tolerance).collect();
         if close.len() > best.len() {
             best = close;
         }

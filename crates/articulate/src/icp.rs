@@ -2,8 +2,8 @@
 //! (Chen and Medioni 1991) with a shrinking gate, so that what is hidden in that state pulls nowhere.
 
 use glam::{DVec3, Vec3};
-use hingecast_geom::{PointTree, Pose};
 use hingecast_geom::pose::quat_from_rotation_vector;
+use hingecast_geom::{PointTree, Pose};
 use nalgebra::{Matrix6, Vector6};
 use rayon::prelude::*;
 

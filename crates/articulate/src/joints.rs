@@ -67,7 +67,8 @@ fn fit(
     doubts: &mut Vec<String>,
 ) -> (Screw, Vec<f64>) {
     let centre = points.iter().sum::<DVec3>() / points.len().max(1) as f64;
-    let radius = (points.iter().map(|x| (*x - centre).length_squared()).sum::<f64>() / points.len().max(1) as f64).sqrt();
+    let radius =
+        (points.iter().map(|x| (*x - centre).length_squared()).sum::<f64>() / points.len().max(1) as f64).sqrt();
     let shift = |m: &Pose| m.apply(centre) - centre;
     let most_shift = motions.iter().map(|m| shift(m).length()).fold(0.0, f64::max);
     let most_turn = motions.iter().map(|m| m.angle() * radius).fold(0.0, f64::max);
@@ -110,9 +111,10 @@ fn fit(
     candidates.extend_from_slice(points);
     let stay = fixed(&candidates, &telling, config.fixed);
     // Sign by the rotation vectors themselves, all turned into one half-space.
-    let turn = telling.iter().map(|m| rotation_vector(m.rot)).fold(DVec3::ZERO, |sum: DVec3, w| {
-        if sum.dot(w) < 0.0 { sum - w } else { sum + w }
-    });
+    let turn = telling
+        .iter()
+        .map(|m| rotation_vector(m.rot))
+        .fold(DVec3::ZERO, |sum: DVec3, w| if sum.dot(w) < 0.0 { sum - w } else { sum + w });
     let line = ransac_line(&stay, 2.0 * spacing, seed);
     let (pivot, mut axis) = line.unwrap_or_else(|| {
         doubts.push(format!("joint '{name}': no line through the points that stay; its axis is the mean rotation"));
@@ -123,7 +125,9 @@ fn fit(
     }
     let off = axis.dot(turn.normalize_or(axis)).clamp(-1.0, 1.0).acos().to_degrees();
     if off > 5.0 {
-        doubts.push(format!("joint '{name}': its fixed points and its rotations disagree about the axis by {off:.0} deg"));
+        doubts.push(format!(
+            "joint '{name}': its fixed points and its rotations disagree about the axis by {off:.0} deg"
+        ));
     }
     let mut values: Vec<f64> = motions.iter().map(|m| rotation_vector(m.rot).dot(axis)).collect();
     // Most states to the positive side, as a person would count.

@@ -160,8 +160,7 @@ fn principal(rows: &[Vec<f32>], d: usize, seed: u64) -> Vec<Vec<f32>> {
     let n = rows.len();
     let width = rows.first().map_or(0, Vec::len);
     let mean: Vec<f32> = (0..width).map(|j| rows.iter().map(|r| r[j]).sum::<f32>() / n as f32).collect();
-    let centred: Vec<Vec<f32>> =
-        rows.iter().map(|r| r.iter().zip(&mean).map(|(x, m)| x - m).collect()).collect();
+    let centred: Vec<Vec<f32>> = rows.iter().map(|r| r.iter().zip(&mean).map(|(x, m)| x - m).collect()).collect();
     let mut rng = fastrand::Rng::with_seed(seed);
     let mut basis: Vec<Vec<f32>> = (0..d).map(|_| (0..width).map(|_| rng.f32() - 0.5).collect()).collect();
     let dot = |a: &[f32], b: &[f32]| a.iter().zip(b).map(|(a, b)| a * b).sum::<f32>();

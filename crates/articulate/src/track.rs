@@ -116,7 +116,11 @@ pub fn run<E: From<SplatError> + From<Cancelled>>(
             engine.adam_step(&gradients, &rates)?;
             if step % 20 == 0 {
                 let at = (state - 1) * config.steps + step;
-                progress.report(at, (n_states - 1) * config.steps, &format!("state {state}, psnr {:.1}", terms.psnr()))?;
+                progress.report(
+                    at,
+                    (n_states - 1) * config.steps,
+                    &format!("state {state}, psnr {:.1}", terms.psnr()),
+                )?;
             }
         }
         let now = engine.gaussians();

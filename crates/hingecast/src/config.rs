@@ -97,7 +97,11 @@ impl Config {
         if let Some(path) = file {
             let text = std::fs::read_to_string(path).map_err(Failure::io(path))?;
             let given: toml::Table = text.parse().map_err(|e: toml::de::Error| {
-                Failure::new(format!("not TOML: {}", e.message()), path.display().to_string(), "see config.toml of any run")
+                Failure::new(
+                    format!("not TOML: {}", e.message()),
+                    path.display().to_string(),
+                    "see config.toml of any run",
+                )
             })?;
             merge(&mut table, given);
         }
@@ -120,7 +124,11 @@ impl Config {
         }
         toml::Value::Table(table).try_into().map_err(|e: toml::de::Error| {
             let place = file.map_or("--set".to_string(), |f| f.display().to_string());
-            Failure::new(e.message().lines().collect::<Vec<_>>().join("; "), place, "see config.toml of any run for all keys")
+            Failure::new(
+                e.message().lines().collect::<Vec<_>>().join("; "),
+                place,
+                "see config.toml of any run for all keys",
+            )
         })
     }
 }
@@ -145,7 +153,8 @@ mod tests {
         let dir = tempfile::tempdir().unwrap();
         let file = dir.path().join("c.toml");
         std::fs::write(&file, "seed = 3\n[fit]\nsteps = 7\n").unwrap();
-        let c = Config::resolve(Preset::Fast, Some(&file), &["fit.steps=9".into(), "parts.cluster=hdbscan".into()]).unwrap();
+        let c = Config::resolve(Preset::Fast, Some(&file), &["fit.steps=9".into(), "parts.cluster=hdbscan".into()])
+            .unwrap();
         assert_eq!((c.seed, c.fit.steps, c.fit.gaussians), (3, 9, 12_000));
         assert_eq!(c.parts.cluster, articulate::segment::Clusterer::Hdbscan);
     }

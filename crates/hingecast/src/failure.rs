@@ -22,7 +22,13 @@ impl Failure {
     /// For `map_err` on file operations.
     pub fn io<E: std::fmt::Display>(path: &Path) -> impl FnOnce(E) -> Self {
         let place = path.display().to_string();
-        move |e| Self::new(format!("cannot read or write a file: {e}"), place, "check the path, its rights and the free space")
+        move |e| {
+            Self::new(
+                format!("cannot read or write a file: {e}"),
+                place,
+                "check the path, its rights and the free space",
+            )
+        }
     }
 }
 
@@ -51,8 +57,6 @@ impl From<hingecast_articulate::ArticulateError> for Failure {
         match e {
             A::Input { what, place, hint } => Self::new(what, place, hint),
             A::Cancelled(c) => c.into(),
-            A::Engine(e) => e.into(),
-            A::Outside(e) => Self::new(e, "while tracking", "run `hingecast check` on the recording"),
         }
     }
 }
@@ -68,7 +72,11 @@ impl From<hingecast_splat::SplatError> for Failure {
 
 impl From<hingecast_twin::ExportError> for Failure {
     fn from(e: hingecast_twin::ExportError) -> Self {
-        Self::new(e.to_string().lines().next().unwrap_or_default(), "the twin folder", "free some disk space, or another -o")
+        Self::new(
+            e.to_string().lines().next().unwrap_or_default(),
+            "the twin folder",
+            "free some disk space, or another -o",
+        )
     }
 }
 

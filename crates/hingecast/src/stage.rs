@@ -148,6 +148,10 @@ pub fn write_json<T: Serialize>(path: &Path, value: &T) -> Result<()> {
 pub fn read_json<T: for<'a> Deserialize<'a>>(path: &Path) -> Result<T> {
     let bytes = std::fs::read(path).map_err(Failure::io(path))?;
     serde_json::from_slice(&bytes).map_err(|e| {
-        Failure::new(format!("not what this program writes: {e}"), path.display().to_string(), "build again with --fresh")
+        Failure::new(
+            format!("not what this program writes: {e}"),
+            path.display().to_string(),
+            "build again with --fresh",
+        )
     })
 }

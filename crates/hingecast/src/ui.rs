@@ -68,7 +68,10 @@ impl Ui {
                     *last = Instant::now();
                     let spent = start.elapsed().as_secs_f64();
                     let eta = spent * (total as f64 / done as f64 - 1.0);
-                    eprintln!("{name:<7} {:>3.0} %  {spent:.0} s, eta {eta:.0} s  {note}", 100.0 * done as f64 / total as f64);
+                    eprintln!(
+                        "{name:<7} {:>3.0} %  {spent:.0} s, eta {eta:.0} s  {note}",
+                        100.0 * done as f64 / total as f64
+                    );
                 }
             },
             cancel,

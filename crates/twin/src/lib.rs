@@ -14,6 +14,7 @@ pub mod fuse;
 pub mod hulls;
 pub mod mass;
 pub mod mjcf;
+pub mod relabel;
 pub mod simplify;
 pub mod surface;
 pub mod urdf;

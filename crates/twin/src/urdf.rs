@@ -12,7 +12,7 @@ pub fn to_string(twin: &Twin) -> String {
     let _ = writeln!(out, "<?xml version=\"1.0\"?>\n<robot name=\"{}\">", escape(&twin.name));
     let _ = writeln!(
         out,
-        "  <mujoco><compiler meshdir=\"meshes\" strippath=\"false\" discardvisual=\"true\" balanceinertia=\"true\"/></mujoco>"
+        "  <mujoco><compiler meshdir=\".\" strippath=\"false\" discardvisual=\"true\" balanceinertia=\"true\"/></mujoco>"
     );
     for (i, part) in twin.parts.iter().enumerate() {
         let origin = link_origin(twin, i);

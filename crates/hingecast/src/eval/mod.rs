@@ -82,7 +82,8 @@ pub fn evaluate(run: &Path, truth: &Path, progress: &Progress) -> Result<Evaluat
     progress.report(3, 10, "")?;
     let matching = matching::match_parts(&found_meshes, &true_meshes, &twin.tree, &truth.tree);
     let joints = joints::errors(&twin.tree, &truth.tree, &matching, &true_meshes, truth.diagonal);
-    let surfaces = surfaces::errors(&found_meshes, &true_meshes, &matching, &twin.tree, &truth.tree, truth.diagonal, &seen);
+    let surfaces =
+        surfaces::errors(&found_meshes, &true_meshes, &matching, &twin.tree, &truth.tree, truth.diagonal, &seen);
     progress.report(6, 10, "")?;
     let (first_state, other_states) = pictures::errors(&folder, &twin.tree, &recording, &truth, &matching, progress)?;
 

@@ -60,7 +60,8 @@ pub fn run_joints(context: &Context, run: &Path, at: &Path) -> Result<()> {
         progress.report(state - 1, context.recording.n_states - 1, "icp")?;
         let target = surface::of_state(context, state, 60_000)?;
         for (part, (points, normals)) in members.iter().enumerate() {
-            let gates: Vec<f64> = [0.03, 0.03, 0.02, 0.02, 0.01, 0.01, 0.01, 0.005, 0.005, 0.005].map(|g| g * diagonal).to_vec();
+            let gates: Vec<f64> =
+                [0.03, 0.03, 0.02, 0.02, 0.01, 0.01, 0.01, 0.005, 0.005, 0.005].map(|g| g * diagonal).to_vec();
             let start = parts.motions[part][state];
             let (pose, report) = icp::align(points, normals, &target, start, &gates);
             // ICP may lose its way where little of the part is in sight: then the tracks have the last word.
@@ -76,13 +77,9 @@ pub fn run_joints(context: &Context, run: &Path, at: &Path) -> Result<()> {
             own.map(|i| Vec3::from(gaussians.means[i]).as_dvec3()).collect()
         })
         .collect();
-    let segmentation = segment::Segmentation {
-        labels: parts.labels.clone(),
-        motions: parts.motions,
-        silhouettes: parts.silhouettes,
-    };
-    let (tree, mut doubts) =
-        joints::run(&segmentation, &points, diagonal, &context.config.joints, context.config.seed);
+    let segmentation =
+        segment::Segmentation { labels: parts.labels.clone(), motions: parts.motions, silhouettes: parts.silhouettes };
+    let (tree, mut doubts) = joints::run(&segmentation, &points, diagonal, &context.config.joints, context.config.seed);
     if let [.., (k, best)] = best_two(&segmentation.silhouettes)[..]
         && best < 0.5
     {
@@ -99,7 +96,13 @@ fn best_two(silhouettes: &[(usize, f64)]) -> Vec<(usize, f64)> {
 }
 
 /// Points and normals of `surface` per part: the part of the nearest gaussian within `reach`.
-fn split(surface: &Surface, means: &[[f32; 3]], labels: &[u8], n_parts: usize, reach: f64) -> Vec<(Vec<Vec3>, Vec<Vec3>)> {
+fn split(
+    surface: &Surface,
+    means: &[[f32; 3]],
+    labels: &[u8],
+    n_parts: usize,
+    reach: f64,
+) -> Vec<(Vec<Vec3>, Vec<Vec3>)> {
     let centres: Vec<Vec3> = means.iter().map(|m| Vec3::from(*m)).collect();
     let tree = PointTree::new(&centres);
     let mut out = vec![(Vec::new(), Vec::new()); n_parts];

@@ -109,7 +109,11 @@ fn refuse_hopeless(recording: &Recording) -> Result<()> {
     let place = recording.root.join("transforms.json").display().to_string();
     if recording.n_states < 2 {
         let what = format!("the recording has {} state: nothing moves", recording.n_states);
-        return Err(Failure::new(what, place, "give every frame its \"state\": 0 before the joint moved, 1 after, ..."));
+        return Err(Failure::new(
+            what,
+            place,
+            "give every frame its \"state\": 0 before the joint moved, 1 after, ...",
+        ));
     }
     for state in 0..recording.n_states {
         let n = recording.frames_of(state, Split::Train).len();

@@ -4,10 +4,11 @@ use super::Context;
 use crate::failure::{Failure, Result};
 use crate::stage::write_json;
 use hingecast_capture::{Recording, Split, View, ViewCache};
-use hingecast_geom::Gaussians;
-use hingecast_splat::{Pixels, Target, TargetImages};
+use hingecast_geom::{Gaussians, Progress};
+use hingecast_splat::{Engine, FitConfig, Pixels, Target, TargetImages, Views, initialise};
 use rayon::prelude::*;
 use std::path::Path;
+use std::sync::Arc;
 
 /// The training picture of a view, as the engine wants it.
 pub fn target(view: &View, background: ([f32; 3], bool)) -> Result<Target> {
@@ -88,9 +89,9 @@ pub fn extent(context: &Context) -> Result<(glam::DVec3, glam::DVec3)> {
 pub fn run(context: &Context, at: &Path) -> Result<()> {
     let (lo, hi) = extent(context)?;
     let diagonal = (hi - lo).length();
-    let targets: Vec<_> = targets(context, 0)?.into_iter().map(std::sync::Arc::new).collect();
+    let targets: Vec<_> = targets(context, 0)?.into_iter().map(Arc::new).collect();
     let progress = context.ui.stage("splat");
-    let gaussians = fit(context, &targets, diagonal, at, &progress)?;
+    let gaussians = fit(context, &targets, at, &progress)?;
     gaussians.write_ply(&at.join("gaussians.ply"))?;
     write_json(&at.join("extent.json"), &Extent { lo: lo.to_array(), hi: hi.to_array(), diagonal })
 }
@@ -107,4 +108,24 @@ pub struct Extent {
 pub fn load(run: &Path) -> Result<(Gaussians, Extent)> {
     let at = run.join("splat");
     Ok((Gaussians::read_ply(&at.join("gaussians.ply"))?, crate::stage::read_json(&at.join("extent.json"))?))
+}
+
+/// Fits the gaussians; a killed fit goes on from its checkpoint in `at`.
+fn fit(context: &Context, targets: &[Arc<Target>], at: &Path, progress: &Progress) -> Result<Gaussians> {
+    let settings = &context.config.fit;
+    let get = |i: usize| targets[i].clone();
+    let views = Views { count: targets.len(), get: &get };
+    let first = initialise(&views, settings.gaussians, context.config.seed)?;
+    let mut engine = Engine::from_gaussians(&first, context.threads)?;
+    let checkpoint = at.join("checkpoint.bin");
+    let config = FitConfig {
+        iterations: settings.steps,
+        seed: context.config.seed,
+        checkpoint: Some(checkpoint.clone()),
+        ..Default::default()
+    };
+    let report = hingecast_splat::fit(&mut engine, &views, &config, progress)?;
+    write_json(&at.join("fit.json"), &serde_json::json!({ "training_psnr": report.psnr, "steps": report.iterations }))?;
+    let _ = std::fs::remove_file(checkpoint);
+    Ok(engine.gaussians())
 }

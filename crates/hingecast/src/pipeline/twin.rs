@@ -5,7 +5,7 @@ use super::{Context, joints, splat};
 use crate::failure::{Failure, Result};
 use crate::stage::{read_json, write_json};
 use hingecast_capture::Split;
-use hingecast_twin::{Observation, build as twin};
+use hingecast_twin::{Observation, build as twin, relabel};
 use std::path::Path;
 
 /// Builds, writes, tries. Answers all doubts about the run, gravest first.
@@ -32,16 +32,22 @@ pub fn run(context: &Context, run: &Path) -> Result<Vec<String>> {
     drop(labeller);
 
     let progress = context.ui.stage("twin");
-    let load = |i: usize| -> Result<Observation> {
+    let observe = |i: usize, labels: Vec<u8>| -> Result<Observation> {
         let view = context.cache.get(frames[i])?;
+        // Depth of a hand is not depth of the object.
+        let depth = view.depth.iter().zip(&view.usable).map(|(d, u)| if *u == 1 { *d } else { 0.0 });
         Ok(Observation {
             state: recording.frames[frames[i]].state,
             camera: view.camera,
-            depth: view.depth.clone(),
-            labels: labels[i].clone(),
+            depth: depth.collect(),
+            labels,
             rgb: view.rgb.clone(),
         })
     };
+    let poses: Vec<_> = (0..recording.n_states).map(|s| found.tree.poses_at(s)).collect();
+    let unlabelled = |i: usize| observe(i, Vec::new());
+    relabel::resolve::<Failure>(&mut labels, &unlabelled, &poses, 0.01 * extent.diagonal)?;
+    let load = |i: usize| observe(i, labels[i].clone());
     let input = twin::Input {
         name: &recording.name,
         tree: &found.tree,

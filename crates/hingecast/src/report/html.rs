@@ -25,7 +25,8 @@ pub(crate) fn page(run: &RunFolder, content: &Content) -> String {
     doubts(&mut out, &run.record.doubts);
     let _ = write!(out, "<h2>Parts and axes on the photos</h2>");
     for (file, caption) in &content.overlays {
-        let _ = write!(out, "<figure><img src=\"{file}\" alt=\"{caption}\"><figcaption>{caption}</figcaption></figure>");
+        let _ =
+            write!(out, "<figure><img src=\"{file}\" alt=\"{caption}\"><figcaption>{caption}</figcaption></figure>");
     }
     joints(&mut out, content);
     let _ = write!(out, "<h2>Joint values per state</h2>{}", content.plot);
@@ -114,7 +115,10 @@ fn parts(out: &mut String, content: &Content) {
 }
 
 fn time(out: &mut String, run: &RunFolder) {
-    let _ = write!(out, "<h2>Time and memory</h2><table><tr><th>stage</th><th>seconds</th><th>peak memory so far</th></tr>");
+    let _ = write!(
+        out,
+        "<h2>Time and memory</h2><table><tr><th>stage</th><th>seconds</th><th>peak memory so far</th></tr>"
+    );
     for s in &run.record.stages {
         let _ = write!(
             out,

@@ -24,7 +24,7 @@ pub fn joint_values(tree: &KinematicTree, diagonal: f64) -> String {
     {
         let area = SVGBackend::with_string(&mut svg, (720, 260)).into_drawing_area();
         // Drawing into a string cannot fail.
-        let mut draw = || -> Result<(), Box<dyn std::error::Error>> {
+        let draw = || -> Result<(), Box<dyn std::error::Error>> {
             let mut chart = ChartBuilder::on(&area)
                 .margin(8)
                 .x_label_area_size(32)

@@ -16,7 +16,11 @@ pub fn config(settings: &SynthSettings, truth: bool) -> Result<SynthConfig> {
             Some((name.to_string(), [from.parse().ok()?, to.parse().ok()?]))
         });
         let (name, range) = parsed.ok_or_else(|| {
-            Failure::new(format!("'{text}' is not JOINT=FROM:TO"), "--range", "for instance --range hinge=0:1.57 (radians)")
+            Failure::new(
+                format!("'{text}' is not JOINT=FROM:TO"),
+                "--range",
+                "for instance --range hinge=0:1.57 (radians)",
+            )
         })?;
         ranges.insert(name, range);
     }

@@ -60,7 +60,13 @@ pub fn detail(e: &Evaluation) -> String {
             p.label_miou
         );
     }
-    let _ = write!(out, "built in {:.0} s, peak memory {:.2} GB, {} doubts", e.build_secs, e.peak_memory_gb, e.doubts.len());
+    let _ = write!(
+        out,
+        "built in {:.0} s, peak memory {:.2} GB, {} doubts",
+        e.build_secs,
+        e.peak_memory_gb,
+        e.doubts.len()
+    );
     out
 }
 
@@ -70,11 +76,17 @@ pub fn overview(evaluations: &[Evaluation]) -> String {
         "| object | parts | types | axis deg (max) | pivot % (max) | motion | CD seen / floor (worst) | PSNR | depth MAE % | part mIoU | s | GB |\n|---|---|---|---|---|---|---|---|---|---|---|---|\n",
     );
     for e in evaluations {
-        let motion: Vec<String> = e
-            .joints
-            .iter()
-            .map(|j| if j.true_type.turns() { format!("{:.2}°", j.motion_mean) } else { format!("{:.4}", j.motion_mean) })
-            .collect();
+        let motion: Vec<String> =
+            e.joints
+                .iter()
+                .map(|j| {
+                    if j.true_type.turns() {
+                        format!("{:.2}°", j.motion_mean)
+                    } else {
+                        format!("{:.4}", j.motion_mean)
+                    }
+                })
+                .collect();
         let worst = e
             .surfaces
             .iter()
