@@ -1,7 +1,7 @@
 //! The stage: observations and tree in, [`Twin`] out.
 
 use crate::fuse::{self, Field};
-use crate::{Inertial, Observation, PartModel, Twin, color, hulls, mass, simplify, surface};
+use crate::{Inertial, Observation, PartModel, Twin, clearance, color, hulls, mass, simplify, surface};
 use glam::{DMat3, DVec3, Vec3};
 use hingecast_geom::{Cancelled, KinematicTree, Pose, Progress, TriMesh};
 use rayon::prelude::*;
@@ -93,12 +93,21 @@ pub fn build<E: From<Cancelled> + Send>(
     progress.check()?;
 
     let mut doubts = Vec::new();
-    let mut meshes: Vec<TriMesh> = fields
-        .par_iter()
-        .map(|field| {
-            let Some(field) = field else { return TriMesh::default() };
-            let fine = surface::drop_crumbs(&surface::extract(field), config.crumbs);
-            simplify::simplify(&fine, config.max_faces, (config.simplify_error * input.diagonal) as f32)
+    let mesh_of = |field: &Field| {
+        let fine = surface::drop_crumbs(&surface::extract(field), config.crumbs);
+        simplify::simplify(&fine, config.max_faces, (config.simplify_error * input.diagonal) as f32)
+    };
+    let mut meshes: Vec<TriMesh> =
+        fields.par_iter().map(|f| f.as_ref().map_or_else(TriMesh::default, mesh_of)).collect();
+    // Root first, then along the tree: every part keeps clear of those before it.
+    let collision: Vec<TriMesh> = (0..fields.len())
+        .into_par_iter()
+        .map(|part| {
+            let before = order.iter().rev().take_while(|&&q| q != part).copied().collect::<Vec<_>>();
+            if before.is_empty() {
+                return meshes[part].clone();
+            }
+            clearance::trim(part, &fields, &before, &poses).map_or_else(TriMesh::default, |f| mesh_of(&f))
         })
         .collect();
     drop(fields);
@@ -106,7 +115,7 @@ pub fn build<E: From<Cancelled> + Send>(
 
     let hull_config = hulls::HullConfig { max_hulls: config.max_hulls, ..Default::default() };
     let decomposed: Vec<(Vec<TriMesh>, usize)> =
-        meshes.par_iter().map(|mesh| hulls::decompose(mesh, &hull_config)).collect();
+        collision.par_iter().map(|mesh| hulls::decompose(mesh, &hull_config)).collect();
     let mut parts = Vec::new();
     for (part, (mesh, (hulls, dropped))) in meshes.into_iter().zip(decomposed).enumerate() {
         let name = &tree.parts[part];

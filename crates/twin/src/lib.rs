@@ -8,6 +8,7 @@
 //! Every part is fused in its own frame from all states: the inside of a drawer and the back of a door are there.
 
 pub mod build;
+pub mod clearance;
 pub mod color;
 pub mod export;
 pub mod fuse;
