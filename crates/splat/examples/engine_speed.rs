@@ -2,6 +2,7 @@
 //!
 //! `cargo run --release -p hingecast-splat --example engine_speed [-- threads]`
 //! A bumpy sphere of flattened gaussians, colour + depth + alpha loss with SSIM, fourteen parameters each.
+//! The twin computes in f64; the same loops in f32 took about two thirds of its time.
 //! The twin runs one view per thread, which is its best case: no synchronisation inside an image.
 
 use glam::{DVec3, Vec3};

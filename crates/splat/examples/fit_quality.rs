@@ -1,6 +1,7 @@
 //! Fits a ray-traced scene and measures held-out views: textured boxes and a sphere, a thin plate, thin rods.
 //!
-//! `cargo run --release -p hingecast-splat --example fit_quality [-- gaussians iterations threads]`
+//! `cargo run --release -p hingecast-splat --example fit_quality [-- gaussians iterations threads noise]`
+//! `noise`: standard deviation of the depth in 1/1000 of the depth; with it colours are rounded to 8 bit.
 //! Colour is supersampled 4 x 4 over a white background; mask and depth are those of the pixel centre.
 
 use glam::{DQuat, DVec2, DVec3};
@@ -125,13 +126,23 @@ fn cameras(count: usize, phase: f64) -> Vec<Camera> {
 fn main() {
     let args: Vec<usize> = std::env::args().skip(1).filter_map(|a| a.parse().ok()).collect();
     let arg = |i: usize, default: usize| args.get(i).copied().unwrap_or(default);
-    let (n, iterations, threads) = (arg(0, 25_000), arg(1, 4000), arg(2, 2));
+    let (n, iterations, threads, noise) = (arg(0, 25_000), arg(1, 4000), arg(2, 2), arg(3, 0));
+    let mut rng = fastrand::Rng::with_seed(3);
     let scene = scene();
     let diagonal = 1.45;
     let targets: Vec<Arc<Target>> = cameras(60, 0.0)
         .iter()
         .map(|camera| {
-            let t = picture(&scene, camera);
+            let mut t = picture(&scene, camera);
+            if noise > 0 {
+                for z in &mut t.depth {
+                    let normal = (0..12).map(|_| rng.f32()).sum::<f32>() - 6.0;
+                    *z *= 1.0 + 1e-3 * noise as f32 * normal;
+                }
+                for c in &mut t.rgb {
+                    *c = (*c * 255.0).round() / 255.0;
+                }
+            }
             let images = TargetImages {
                 rgb: Pixels::F32(&t.rgb),
                 depth: Some(&t.depth),

@@ -1,11 +1,15 @@
 //! Depth sort and binning: for every 16 x 16 tile the gaussians that touch it, nearest first, each with one bit per 4 x 4
 //! (or 4 x 2) pixel block that its alpha >= 1/255 ellipse reaches.
 
+use crate::error::SplatError;
 use crate::pool::Shards;
 use crate::project::{MIN_LOG2_ALPHA, NO_RECT, Splat};
 use crate::raster::prefetch;
 use crate::simd::Lanes;
 use crate::view::{TILE, View};
+
+/// A slot is 64 bytes: 4 GiB. A fit at 512 x 512 with 100 000 gaussians needs 2^18.
+const MOST_SLOTS: u32 = 1 << 26;
 
 /// One gaussian in one tile.
 #[derive(Clone, Copy, Default, Debug, PartialEq)]
@@ -35,20 +39,31 @@ pub(crate) fn unpack_rect(rect: u32) -> [usize; 4] {
 
 impl Order {
     /// Lists the visible gaussians, gives each one slot per tile of its rectangle, sorts by depth.
-    pub fn build(&mut self, splats: &[Splat], rects: &[u32]) {
+    ///
+    /// # Errors
+    /// More slots than memory: gaussians as large as the picture.
+    pub fn build(&mut self, splats: &[Splat], rects: &[u32]) -> Result<(), SplatError> {
         self.keys.clear();
         self.slot_base.clear();
-        let mut slots = 0;
+        let mut slots = 0u32;
         for (id, (splat, &rect)) in splats.iter().zip(rects).enumerate() {
             self.slot_base.push(slots);
             if rect != NO_RECT {
                 let [x0, x1, y0, y1] = unpack_rect(rect);
                 slots += ((x1 - x0 + 1) * (y1 - y0 + 1)) as u32;
+                if slots > MOST_SLOTS {
+                    return Err(SplatError::Range {
+                        what: "number of (gaussian, tile) pairs",
+                        value: slots.into(),
+                        range: "0..=2^26: the gaussians have grown to the size of the picture; use smaller rates",
+                    });
+                }
                 self.keys.push((splat.z.to_bits(), id as u32));
             }
         }
         self.slot_base.push(slots);
         self.radix_sort();
+        Ok(())
     }
 
     pub fn slots(&self) -> usize {

@@ -257,7 +257,7 @@ impl Engine {
         self.buffers.extra.clear();
         self.buffers.extra.extend_from_slice(options.extra);
         self.buffers.extra.resize(self.params.padded(0).len() * options.channels, 0.0);
-        self.buffers.forward(&mut self.pool, self.kernels, &self.params, &self.groups, view);
+        self.buffers.forward(&mut self.pool, self.kernels, &self.params, &self.groups, view)?;
         self.rendered = Some(*camera);
         Ok(())
     }

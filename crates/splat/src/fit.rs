@@ -46,9 +46,9 @@ impl Default for FitConfig {
             seed: 0,
             half_size_share: 1.0 / 3.0,
             loss: LossConfig::default(),
-            rates: Rates { means: 1e-3, scales: 1e-2, quats: 5e-3, opacity: 5e-2, sh0: 2e-2, sh1: 2e-3 },
+            rates: Rates { means: 1e-3, scales: 2e-2, quats: 5e-3, opacity: 5e-2, sh0: 2e-2, sh1: 2e-3 },
             final_means: 0.02,
-            final_others: 0.1,
+            final_others: 0.25,
             relocate_every: 250,
             checkpoint: None,
             checkpoint_every: 1000,
@@ -108,7 +108,7 @@ pub fn fit(
         if relocation_due(config, state.iteration) {
             let mut rng = fastrand::Rng::with_seed(config.seed ^ (state.iteration as u64) << 20);
             let some: Vec<_> = (0..views.count.min(8)).map(|_| (views.get)(rng.usize(..views.count))).collect();
-            report.relocated += relocate(engine, &some, engine.len() / 20, &mut rng)?;
+            report.relocated += relocate(engine, &some, state.extent, engine.len() / 20, &mut rng)?;
         }
         if recent.len() > views.count {
             recent.remove(0);

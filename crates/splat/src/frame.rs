@@ -1,6 +1,7 @@
 //! The passes of one image over reused buffers: project, sort, bin, draw; loss; back to pairs; back to parameters.
 
 use crate::bins::{self, Entry, Order};
+use crate::error::SplatError;
 use crate::kernels::Kernels;
 use crate::loss::{self, BandSums, LossConfig, LossTerms};
 use crate::params::Planes;
@@ -49,7 +50,14 @@ fn chunks(params: &Planes) -> usize {
 
 impl FrameBuffers {
     /// Renders `view` into `image`. `extra` and `channels` were set by the caller.
-    pub fn forward(&mut self, pool: &mut Pool, kernels: &Kernels, params: &Planes, groups: &[u16], view: View) {
+    pub fn forward(
+        &mut self,
+        pool: &mut Pool,
+        kernels: &Kernels,
+        params: &Planes,
+        groups: &[u16],
+        view: View,
+    ) -> Result<(), SplatError> {
         let len = params.padded(0).len();
         self.view = view;
         let view = &self.view;
@@ -73,7 +81,7 @@ impl FrameBuffers {
         };
         pool.run(chunks(params), |i| unsafe { (kernels.project)(&args, i) });
 
-        self.order.build(&self.splats, &self.rects);
+        self.order.build(&self.splats, &self.rects)?;
 
         let strips = pool.threads();
         let args = bins::Args {
@@ -98,6 +106,7 @@ impl FrameBuffers {
         };
         let draw = if self.channels > 0 { kernels.forward_extra } else { kernels.forward };
         pool.run(tiles, |i| unsafe { draw(&args, i) });
+        Ok(())
     }
 
     /// Loss of `image` against `target`; fills the gradient's first five planes.

@@ -1,17 +1,25 @@
 //! A fork-join pool whose workers spin between the short parallel regions of one step.
 //!
 //! A step is about ten regions of a fraction of a millisecond; waking a sleeping thread for each costs 8-10 % of the step.
-//! A worker that hears nothing for about 0.1 ms goes to sleep, so an idle engine costs nothing.
+//! A worker that hears nothing for about a millisecond goes to sleep, so an idle engine costs nothing.
 
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 use std::thread::JoinHandle;
 
-/// Spins before a worker parks; about 0.1 ms.
-const SPINS_BEFORE_PARK: u32 = 4_000;
-/// Spins before the caller lets other threads run: matters when there are more threads than cores.
-const SPINS_BEFORE_YIELD: u32 = 20_000;
+/// Spins, about 10 us, before a waiting thread offers its core: when other programs want the cores too, the thread that we
+/// wait for may be waiting for ours.
+const SPINS_BEFORE_YIELD: u32 = 400;
+/// Spins and yields before a worker parks; about 1 ms on an idle machine.
+const TRIES_BEFORE_PARK: u32 = 4_000;
+
+/// One turn of waiting.
+#[inline]
+fn wait_a_little(tries: &mut u32) {
+    *tries += 1;
+    if *tries < SPINS_BEFORE_YIELD { std::hint::spin_loop() } else { std::thread::yield_now() }
+}
 
 struct Shared {
     /// Number of the current region; workers wait for it to change.
@@ -80,10 +88,9 @@ impl Pool {
             }
         }
         let mine = catch_unwind(AssertUnwindSafe(|| take_items(s, job)));
-        let mut spins = 0;
+        let mut tries = 0;
         while s.unfinished.load(Ordering::Acquire) > 0 {
-            spins += 1;
-            if spins > SPINS_BEFORE_YIELD { std::thread::yield_now() } else { std::hint::spin_loop() }
+            wait_a_little(&mut tries);
         }
         if let Err(panic) = mine {
             std::panic::resume_unwind(panic);
@@ -106,11 +113,10 @@ fn take_items(s: &Shared, job: &(dyn Fn(usize) + Sync)) {
 fn work(s: &Shared, index: usize) {
     let mut seen = 0;
     loop {
-        let mut spins = 0;
+        let mut tries = 0;
         while s.region.load(Ordering::Acquire) == seen {
-            spins += 1;
-            if spins < SPINS_BEFORE_PARK {
-                std::hint::spin_loop();
+            if tries < TRIES_BEFORE_PARK {
+                wait_a_little(&mut tries);
                 continue;
             }
             // The caller reads `parked` after it changed `region`, we read `region` after we set `parked`: one of the two

@@ -1,4 +1,4 @@
-//! Moves gaussians that do nothing to where the picture is wrong. Their number stays fixed.
+//! Moves gaussians that do nothing, or have grown out of proportion, to where the picture is wrong. Their number stays fixed.
 
 use crate::engine::{Engine, RenderOptions};
 use crate::error::SplatError;
@@ -10,6 +10,8 @@ use std::sync::Arc;
 
 /// Opacity below which a gaussian is dead.
 const DEAD_OPACITY: f32 = 0.02;
+/// Standard deviation, as a share of the object's radius, above which a gaussian is out of proportion.
+const LARGEST: f32 = 0.5;
 /// Errors smaller than this are noise of the pictures, not missing gaussians.
 const NOISE: f32 = 0.03;
 
@@ -29,6 +31,7 @@ struct Place {
 pub(crate) fn relocate(
     engine: &mut Engine,
     targets: &[Arc<Target>],
+    extent: f32,
     most: usize,
     rng: &mut fastrand::Rng,
 ) -> Result<usize, SplatError> {
@@ -37,11 +40,12 @@ pub(crate) fn relocate(
     }
     let (_, second, steps) = engine.moments();
     let never_seen = |i: usize| steps > 0 && (0..second.count()).all(|k| second.plane(k)[i] == 0.0);
+    let huge = |i: usize| (0..3).any(|k| engine.params().plane(plane::SCALES + k)[i].exp() > LARGEST * extent);
     let mut dead: Vec<usize> = engine
         .opacities()
         .iter()
         .enumerate()
-        .filter(|(i, o)| **o < DEAD_OPACITY || o.is_nan() || never_seen(*i))
+        .filter(|(i, o)| **o < DEAD_OPACITY || o.is_nan() || never_seen(*i) || huge(*i))
         .map(|(i, _)| i)
         .collect();
     dead.truncate(most);

@@ -117,6 +117,42 @@ fn same_bytes_with_one_and_two_threads() {
 }
 
 #[test]
+fn a_loss_on_extra_channels_reaches_values_and_shapes() {
+    let g = gaussians(N, 9, false);
+    let camera = camera(71, 53);
+    let target = target(&camera, 10);
+    let extra = extra_values();
+    let mut engine = Engine::from_gaussians(&g, 2).unwrap();
+    // Only the extra channels count: their mean.
+    let nothing = LossConfig { ssim: 1e-12, depth: 0.0, alpha: 0.0, ..Default::default() };
+    let (mut all, mut plain) = (Gradients::default(), Gradients::default());
+    let mut seen = 0.0;
+    let terms = engine
+        .loss_and_gradients_with_extra(
+            &target,
+            &nothing,
+            &extra,
+            3,
+            |picture, gradient| {
+                let scale = 1.0 / picture.len() as f32;
+                gradient.fill(scale);
+                seen = f64::from(picture.iter().sum::<f32>() * scale);
+                seen
+            },
+            &mut all,
+        )
+        .unwrap();
+    let without = engine.loss_and_gradients(&target, &nothing, &mut plain).unwrap();
+    assert!((terms.total - without.total - seen).abs() < 1e-9 && seen > 0.0);
+    assert_eq!(all.extra.len(), 3 * N);
+    assert!(plain.extra.is_empty());
+    // The sum is linear in the values: value times gradient adds up to the loss.
+    let sum: f64 = all.extra.iter().zip(&extra).map(|(a, b)| f64::from(a * b)).sum();
+    assert!((sum - seen).abs() < 1e-4 * seen, "{sum} against {seen}");
+    assert!(all.params.plane(plane::MEANS) != plain.params.plane(plane::MEANS));
+}
+
+#[test]
 fn fused_step_equals_gradients_then_adam() {
     let g = gaussians(500, 6, true);
     let camera = camera(71, 53);

@@ -14,7 +14,7 @@ use glam::DVec3;
 use hingecast_geom::{Camera, Gaussians, Pose};
 use project::{Screen, SplatGradient};
 
-/// One place to change the precision that is compared with (f32 is about as fast as f64 here).
+/// f64, so that central differences can take small steps.
 pub type Real = f64;
 
 const TILE: usize = 16;
