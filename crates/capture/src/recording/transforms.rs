@@ -54,7 +54,15 @@ pub(crate) struct Document {
     pub name: Option<String>,
     pub metric: bool,
     pub up: DVec3,
-    pub problems: Vec<CaptureError>,
+    pub problems: Vec<Problem>,
+}
+
+/// Something wrong, and the frame that it concerns: `check` offers to drop that.
+#[derive(Clone, Debug)]
+pub(crate) struct Problem {
+    pub error: CaptureError,
+    /// The `transforms.json` and the position in its `frames`.
+    pub frame: Option<(PathBuf, usize)>,
 }
 
 /// The documents of a recording: `transforms.json`, or one in each `state_<n>/`.
@@ -106,7 +114,7 @@ fn parse(root: &Path, file: &Path, folder_state: Option<usize>) -> Result<Docume
     let Some(list) = list.as_array() else { return Err(top.wrong("frames", list, "a list of objects")) };
 
     let mut problems = Vec::new();
-    let mut keep = |r: Result<(), CaptureError>| problems.extend(r.err());
+    let mut keep = |r: Result<(), CaptureError>| problems.extend(r.err().map(|error| Problem { error, frame: None }));
     let mut document = Document {
         root: root.to_path_buf(),
         file: file.to_path_buf(),
@@ -139,7 +147,7 @@ fn parse(root: &Path, file: &Path, folder_state: Option<usize>) -> Result<Docume
         };
         match result {
             Ok(e) => document.entries.push(e),
-            Err(problem) => problems.push(problem),
+            Err(error) => problems.push(Problem { error, frame: Some((file.to_path_buf(), index)) }),
         }
     }
     document.problems = problems;
