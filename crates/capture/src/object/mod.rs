@@ -228,10 +228,8 @@ impl PartGeometry {
         let mut used = vec![false; self.vertices.len()];
         self.faces.iter().flatten().for_each(|&i| used[i as usize] = true);
         let mut new_index = vec![0u32; used.len()];
-        let mut next = 0;
-        for (slot, _) in new_index.iter_mut().zip(&used).filter(|(_, u)| **u) {
-            *slot = next;
-            next += 1;
+        for (next, (slot, _)) in new_index.iter_mut().zip(&used).filter(|(_, u)| **u).enumerate() {
+            *slot = next as u32;
         }
         self.faces.iter_mut().flatten().for_each(|i| *i = new_index[*i as usize]);
         fn keep<T>(list: &mut Vec<T>, used: &[bool]) {

@@ -168,7 +168,7 @@ pub(crate) fn camera_from_gl(world_from_gl: &DMat4, place: &str) -> Result<Pose,
             "leave the frame out, or run hingecast check --fix",
         ));
     }
-    if !(error <= MAX_RIGIDITY_ERROR) {
+    if error > MAX_RIGIDITY_ERROR {
         let what = if glam::DMat3::from_mat4(*world_from_gl).determinant() < 0.0 {
             "a camera pose is mirrored (determinant -1): one axis has the wrong sign".to_string()
         } else {

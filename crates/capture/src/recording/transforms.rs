@@ -129,7 +129,10 @@ fn parse(root: &Path, file: &Path, folder_state: Option<usize>) -> Result<Docume
     keep(top.flag("metric").map(|m| document.metric = m.unwrap_or(false)));
     keep(top.numbers("up").and_then(|up| match up.map(DVec3::from_array).map(|u| (u, u.try_normalize())) {
         None => Ok(()),
-        Some((_, Some(unit))) => Ok(document.up = unit),
+        Some((_, Some(unit))) => {
+            document.up = unit;
+            Ok(())
+        }
         Some(_) => Err(top.wrong("up", &object["up"], "a direction that is not zero")),
     }));
     let mut test = BTreeSet::new();
