@@ -189,7 +189,7 @@ fn states_apart(recording: &Recording, looks: &[Option<Look>], by_state: &[Vec<u
     if n < 2 || all.len() < 100 {
         return;
     }
-    // A tolerance of 2 % of a typical state's extent.
+    // A tolerance of 4 % of a typical state's extent: the lid of a closed laptop counts as its keyboard.
     let extent = |cloud: &Vec<Vec<DVec3>>| {
         let (lo, hi) =
             cloud.iter().flatten().fold((DVec3::INFINITY, DVec3::NEG_INFINITY), |(l, h), &x| (l.min(x), h.max(x)));
@@ -197,7 +197,7 @@ fn states_apart(recording: &Recording, looks: &[Option<Look>], by_state: &[Vec<u
     };
     let mut extents: Vec<f64> = clouds.iter().map(extent).collect();
     extents.sort_by(f64::total_cmp);
-    let tolerance = 0.02 * extents[n / 2];
+    let tolerance = 0.04 * extents[n / 2];
     let agreement = |s: usize, r: usize| {
         let mut fate = Fate::default();
         for (&i, from) in by_state[s].iter().zip(&clouds[s]) {
@@ -222,7 +222,12 @@ fn states_apart(recording: &Recording, looks: &[Option<Look>], by_state: &[Vec<u
                 100.0 * own
             );
             let hint = "register all states together (one reconstruction over all pictures), then export again";
-            out.push(error("states-apart", CaptureError::new(what, place, hint)));
+            let mut finding = error("states-apart", CaptureError::new(what, place, hint));
+            // With two states nothing tells a registration that failed from an object of which most has moved.
+            if n == 2 {
+                finding.severity = Severity::Warning;
+            }
+            out.push(finding);
         }
     }
 }
