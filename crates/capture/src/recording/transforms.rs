@@ -65,6 +65,14 @@ pub(crate) struct Problem {
     pub frame: Option<(PathBuf, usize)>,
 }
 
+/// Where a frame's state comes from when the frame does not say it.
+#[derive(Clone, Copy)]
+pub(crate) enum DefaultState {
+    /// It must say it.
+    None,
+    Is(usize),
+}
+
 /// The documents of a recording: `transforms.json`, or one in each `state_<n>/`.
 ///
 /// # Errors
@@ -75,7 +83,7 @@ pub(crate) fn read(path: &Path) -> Result<Vec<Document>, CaptureError> {
     let single = if path.is_file() { std::path::absolute(path).ok() } else { None };
     let single = single.unwrap_or_else(|| root.join("transforms.json"));
     if single.is_file() {
-        return Ok(vec![parse(&root, &single, None)?]);
+        return Ok(vec![parse(&root, &single, DefaultState::None)?]);
     }
     let folders = state_folders(&root);
     if folders.is_empty() {
@@ -85,7 +93,10 @@ pub(crate) fn read(path: &Path) -> Result<Vec<Document>, CaptureError> {
             "point at a recording folder; other layouts go through: hingecast import SRC -o RECORDING",
         ));
     }
-    folders.into_iter().map(|(state, folder)| parse(&root, &folder.join("transforms.json"), Some(state))).collect()
+    folders
+        .into_iter()
+        .map(|(state, folder)| parse(&root, &folder.join("transforms.json"), DefaultState::Is(state)))
+        .collect()
 }
 
 /// `state_<n>` folders with a transforms.json, by number.
@@ -101,7 +112,7 @@ fn state_folders(root: &Path) -> Vec<(usize, PathBuf)> {
     folders
 }
 
-fn parse(root: &Path, file: &Path, folder_state: Option<usize>) -> Result<Document, CaptureError> {
+pub(crate) fn parse(root: &Path, file: &Path, folder_state: DefaultState) -> Result<Document, CaptureError> {
     let text = std::fs::read_to_string(file).map_err(|e| CaptureError::read(file, e))?;
     let value = read_json(&text, file)?;
     let label = file.strip_prefix(root).unwrap_or(file).display().to_string();
@@ -179,7 +190,7 @@ fn entry(
     f: &Fields,
     index: usize,
     folder: &Path,
-    folder_state: Option<usize>,
+    folder_state: DefaultState,
     test: &BTreeSet<String>,
 ) -> Result<Entry, CaptureError> {
     let path = |key: &str| Ok::<_, CaptureError>(f.text(key)?.map(|p| resolve(folder, p)));
@@ -196,8 +207,10 @@ fn entry(
     }
     let state = match (f.count("state")?, folder_state) {
         (Some(state), _) => state,
-        (None, Some(state)) => state,
-        (None, None) => return Err(f.missing("state", "which joint configuration the picture shows, from 0")),
+        (None, DefaultState::Is(state)) => state,
+        (None, DefaultState::None) => {
+            return Err(f.missing("state", "which joint configuration the picture shows, from 0"));
+        }
     };
     let split = if test.contains(&normal_name(file_path)) { Split::Test } else { Split::Train };
     Ok(Entry {
