@@ -1,10 +1,10 @@
 //! Records a synthetic object: `cargo run --release -p hingecast-capture --example synth -- OBJECT -o REC`.
 
+use hingecast_capture::CaptureError;
 use hingecast_capture::object::ArticulatedObject;
-use hingecast_capture::synth::{SynthConfig, synth};
-use hingecast_capture::{CaptureError, Truth};
+use hingecast_capture::synth::{Noise, SynthConfig, synth};
 use hingecast_geom::Progress;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 fn main() {
     if let Err(e) = run() {
@@ -17,7 +17,7 @@ fn run() -> Result<(), CaptureError> {
     let usage = |what: String| {
         CaptureError::new(
             what,
-            "synth OBJECT -o REC [--states N] [--views N] [--test-views N] [--size N] [--seed N] [--range joint=lo:hi]",
+            "synth OBJECT -o REC [--states N] [--views N] [--test-views N] [--size N] [--seed N] [--range joint=lo:hi] [--noise d435] [--occluders] [--walk]",
             "give an object and an output folder",
         )
     };
@@ -33,6 +33,9 @@ fn run() -> Result<(), CaptureError> {
             "--test-views" => config.test_views = number(value()?)?,
             "--size" => config.size = number(value()?)?,
             "--seed" => config.seed = number(value()?)? as u64,
+            "--noise" => config.noise = if value()? == "d435" { Noise::D435 } else { Noise::None },
+            "--occluders" => config.occluders = 0.25,
+            "--walk" => config.same_cameras = false,
             "--range" => {
                 let text = value()?;
                 let parsed = text.split_once('=').and_then(|(name, r)| {
@@ -53,6 +56,5 @@ fn run() -> Result<(), CaptureError> {
     for ((name, [from, to]), joint) in report.ranges.iter().zip(&object.tree.joints) {
         println!("  {name} -> {}: {from:.3} .. {to:.3} of {:?}", object.tree.parts[joint.child], joint.limits);
     }
-    let _ = Truth::folder_of(Path::new("x"));
     Ok(())
 }

@@ -2,12 +2,16 @@
 //!
 //! - [`Recording`] reads the native layout (nerfstudio's `transforms.json` plus a per-frame `state`);
 //!   [`ViewCache`] keeps decoded views within a byte budget.
+//! - [`check`] names what is wrong with a recording and repairs what is safe to repair.
+//! - [`import`] converts other layouts of the field to it.
 //! - [`object`] loads articulated objects from URDF or MJCF, [`synth`] renders recordings of them.
 //! - [`truth`] is what `synth` knows and `build` must not read: only evaluation and tests open it.
 //!
 //! Cameras are OpenCV (x right, y down, z forward), pixel centres at +0.5, depth is z, 0 = unknown.
 
+pub mod check;
 pub mod error;
+pub mod import;
 pub mod object;
 pub mod recording;
 pub mod synth;

@@ -225,7 +225,7 @@ impl<'a, 'i> Loader<'a, 'i> {
         let Some(axis) = axis.try_normalize() else {
             return Err(self.reader.at(node, "the joint's axis is zero", "give a direction"));
         };
-        if !(limits[0] < limits[1]) {
+        if limits[0] >= limits[1] {
             return Err(self.reader.at(
                 node,
                 format!("the joint's range {limits:?} is empty"),
@@ -340,7 +340,7 @@ impl<'a, 'i> Loader<'a, 'i> {
         } else {
             DQuat::IDENTITY
         };
-        if !(rot.length() > 1e-9) {
+        if rot.length() < 1e-9 {
             return Err(self.reader.at(node, "the orientation is zero", "give a unit quaternion w x y z"));
         }
         Ok(Pose::new(rot.normalize(), trans))

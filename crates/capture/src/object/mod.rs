@@ -112,6 +112,7 @@ impl ArticulatedObject {
     ) -> Result<Self, String> {
         for part in &mut self.parts {
             part.drop_duplicate_faces();
+            part.drop_unused_vertices();
             let link = part.links.iter().find(|l| seen(l)).or(part.links.first());
             let named = part.links.iter().find_map(|l| names.get(l));
             let name = named.or(link).cloned().unwrap_or_default().replace(['/', '\\'], "_");
@@ -222,5 +223,21 @@ impl PartGeometry {
         self.faces.retain(|_| *flags.next().unwrap_or(&true));
         let mut flags = keep.iter();
         self.materials.retain(|_| *flags.next().unwrap_or(&true));
+    }
+    fn drop_unused_vertices(&mut self) {
+        let mut used = vec![false; self.vertices.len()];
+        self.faces.iter().flatten().for_each(|&i| used[i as usize] = true);
+        let mut new_index = vec![0u32; used.len()];
+        for (next, (slot, _)) in new_index.iter_mut().zip(&used).filter(|(_, u)| **u).enumerate() {
+            *slot = next as u32;
+        }
+        self.faces.iter_mut().flatten().for_each(|i| *i = new_index[*i as usize]);
+        fn keep<T>(list: &mut Vec<T>, used: &[bool]) {
+            let mut flags = used.iter();
+            list.retain(|_| *flags.next().unwrap_or(&false));
+        }
+        keep(&mut self.vertices, &used);
+        keep(&mut self.normals, &used);
+        keep(&mut self.uvs, &used);
     }
 }

@@ -179,7 +179,7 @@ impl Reader<'_> {
             _ if kind == JointKind::Continuous => [-pi, pi],
             _ => [0.0, 0.0],
         };
-        if !(limits[0] <= limits[1]) {
+        if limits[0] > limits[1] {
             return Err(self.at(node, format!("the joint's limits {limits:?} are reversed"), "lower comes first"));
         }
         let parent_from_joint = self.origin(node)?;

@@ -9,10 +9,6 @@ pub(super) struct Reader<'a> {
 }
 
 impl Reader<'_> {
-    pub fn folder(&self) -> &Path {
-        self.file.parent().unwrap_or(Path::new("."))
-    }
-
     pub fn error(&self, what: impl Into<String>, hint: &str) -> CaptureError {
         CaptureError::new(what, self.file.display().to_string(), hint)
     }

@@ -21,8 +21,9 @@ impl<'a> Fields<'a> {
         if text.len() > 80 {
             text = text.chars().take(77).collect::<String>() + "...";
         }
-        let what =
-            if value.is_null() { "a number is not finite (NaN, inf or null)" } else { "a field has the wrong type" };
+        // The reader turned NaN and Infinity into null.
+        let has_null = value.is_null() || value.as_array().is_some_and(|a| a.contains(&Value::Null));
+        let what = if has_null { "a number is not finite (NaN, inf or null)" } else { "a field has the wrong type" };
         CaptureError::new(
             format!("{what}: {key} should be {expected}"),
             format!("{}.{key} = {text}", self.place),

@@ -21,7 +21,7 @@ use glam::{DMat4, DVec3};
 use hingecast_geom::{Camera, Pose};
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
-use transforms::{Document, Entry};
+use transforms::{Document, Entry, Problem};
 
 /// Whether a frame may be fitted, or is kept for measuring.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
@@ -78,13 +78,13 @@ impl Recording {
         let mut problems = Vec::new();
         let recording = Self::from_documents(&documents, &mut problems);
         match problems.into_iter().next() {
-            Some(problem) => Err(problem),
+            Some(problem) => Err(problem.error),
             None => Ok(recording),
         }
     }
 
     /// What can be made of the documents; everything that is wrong goes to `problems`, frames with problems are left out.
-    pub(crate) fn from_documents(documents: &[Document], problems: &mut Vec<CaptureError>) -> Self {
+    pub(crate) fn from_documents(documents: &[Document], problems: &mut Vec<Problem>) -> Self {
         let root = documents.first().map(|d| d.root.clone()).unwrap_or_default();
         let mut frames = Vec::new();
         let (mut name, mut metric, mut up) = (None, false, DVec3::Z);
@@ -98,7 +98,7 @@ impl Recording {
                 let next = next_view.entry(entry.state).or_default();
                 match frame(entry, *next) {
                     Ok(f) => frames.push(f),
-                    Err(problem) => problems.push(problem),
+                    Err(error) => problems.push(Problem { error, frame: Some((document.file.clone(), entry.index)) }),
                 }
                 *next += 1;
             }
@@ -168,7 +168,7 @@ pub(crate) fn camera_from_gl(world_from_gl: &DMat4, place: &str) -> Result<Pose,
             "leave the frame out, or run hingecast check --fix",
         ));
     }
-    if !(error <= MAX_RIGIDITY_ERROR) {
+    if error > MAX_RIGIDITY_ERROR {
         let what = if glam::DMat3::from_mat4(*world_from_gl).determinant() < 0.0 {
             "a camera pose is mirrored (determinant -1): one axis has the wrong sign".to_string()
         } else {
@@ -191,27 +191,29 @@ pub(crate) fn gl_from_camera(camera_from_world: &Pose) -> DMat4 {
 }
 
 /// States with training frames must be 0..n; held-out states come after them.
-fn count_states(frames: &[Frame], documents: &[Document], problems: &mut Vec<CaptureError>) -> usize {
+fn count_states(frames: &[Frame], documents: &[Document], problems: &mut Vec<Problem>) -> usize {
     let mut train: Vec<usize> = frames.iter().filter(|f| f.split == Split::Train).map(|f| f.state).collect();
     train.sort_unstable();
     train.dedup();
     let place = documents.first().map(|d| d.file.display().to_string()).unwrap_or_default();
+    let quiet = problems.is_empty();
+    let mut report = |error| problems.push(Problem { error, frame: None });
     // Problems met before explain missing frames better than what follows from them.
-    if frames.is_empty() && problems.is_empty() {
-        problems.push(CaptureError::new(
+    if frames.is_empty() && quiet {
+        report(CaptureError::new(
             "the recording has no frames",
             format!("{place}: frames = []"),
             "record again, or point at the folder that holds the pictures' transforms.json",
         ));
-    } else if train.is_empty() && problems.is_empty() {
-        problems.push(CaptureError::new(
+    } else if train.is_empty() && quiet {
+        report(CaptureError::new(
             "every frame is held out: nothing is left to fit",
             format!("{place}: test_filenames lists all {} frames", frames.len()),
             "take some file names out of test_filenames",
         ));
     }
     if let Some((expected, &found)) = train.iter().enumerate().find(|(i, s)| i != *s) {
-        problems.push(CaptureError::new(
+        report(CaptureError::new(
             format!("states are not numbered 0, 1, 2, ...: state {expected} has no training frames"),
             format!("{place}: frames[].state goes from {} to {found}", expected as i64 - 1),
             "renumber the states without gaps (hingecast check --fix does it)",

@@ -54,7 +54,23 @@ pub(crate) struct Document {
     pub name: Option<String>,
     pub metric: bool,
     pub up: DVec3,
-    pub problems: Vec<CaptureError>,
+    pub problems: Vec<Problem>,
+}
+
+/// Something wrong, and the frame that it concerns: `check` offers to drop that.
+#[derive(Clone, Debug)]
+pub(crate) struct Problem {
+    pub error: CaptureError,
+    /// The `transforms.json` and the position in its `frames`.
+    pub frame: Option<(PathBuf, usize)>,
+}
+
+/// Where a frame's state comes from when the frame does not say it.
+#[derive(Clone, Copy)]
+pub(crate) enum DefaultState {
+    /// It must say it.
+    None,
+    Is(usize),
 }
 
 /// The documents of a recording: `transforms.json`, or one in each `state_<n>/`.
@@ -67,7 +83,7 @@ pub(crate) fn read(path: &Path) -> Result<Vec<Document>, CaptureError> {
     let single = if path.is_file() { std::path::absolute(path).ok() } else { None };
     let single = single.unwrap_or_else(|| root.join("transforms.json"));
     if single.is_file() {
-        return Ok(vec![parse(&root, &single, None)?]);
+        return Ok(vec![parse(&root, &single, DefaultState::None)?]);
     }
     let folders = state_folders(&root);
     if folders.is_empty() {
@@ -77,7 +93,10 @@ pub(crate) fn read(path: &Path) -> Result<Vec<Document>, CaptureError> {
             "point at a recording folder; other layouts go through: hingecast import SRC -o RECORDING",
         ));
     }
-    folders.into_iter().map(|(state, folder)| parse(&root, &folder.join("transforms.json"), Some(state))).collect()
+    folders
+        .into_iter()
+        .map(|(state, folder)| parse(&root, &folder.join("transforms.json"), DefaultState::Is(state)))
+        .collect()
 }
 
 /// `state_<n>` folders with a transforms.json, by number.
@@ -93,7 +112,7 @@ fn state_folders(root: &Path) -> Vec<(usize, PathBuf)> {
     folders
 }
 
-fn parse(root: &Path, file: &Path, folder_state: Option<usize>) -> Result<Document, CaptureError> {
+pub(crate) fn parse(root: &Path, file: &Path, folder_state: DefaultState) -> Result<Document, CaptureError> {
     let text = std::fs::read_to_string(file).map_err(|e| CaptureError::read(file, e))?;
     let value = read_json(&text, file)?;
     let label = file.strip_prefix(root).unwrap_or(file).display().to_string();
@@ -106,7 +125,7 @@ fn parse(root: &Path, file: &Path, folder_state: Option<usize>) -> Result<Docume
     let Some(list) = list.as_array() else { return Err(top.wrong("frames", list, "a list of objects")) };
 
     let mut problems = Vec::new();
-    let mut keep = |r: Result<(), CaptureError>| problems.extend(r.err());
+    let mut keep = |r: Result<(), CaptureError>| problems.extend(r.err().map(|error| Problem { error, frame: None }));
     let mut document = Document {
         root: root.to_path_buf(),
         file: file.to_path_buf(),
@@ -121,7 +140,10 @@ fn parse(root: &Path, file: &Path, folder_state: Option<usize>) -> Result<Docume
     keep(top.flag("metric").map(|m| document.metric = m.unwrap_or(false)));
     keep(top.numbers("up").and_then(|up| match up.map(DVec3::from_array).map(|u| (u, u.try_normalize())) {
         None => Ok(()),
-        Some((_, Some(unit))) => Ok(document.up = unit),
+        Some((_, Some(unit))) => {
+            document.up = unit;
+            Ok(())
+        }
         Some(_) => Err(top.wrong("up", &object["up"], "a direction that is not zero")),
     }));
     let mut test = BTreeSet::new();
@@ -139,7 +161,7 @@ fn parse(root: &Path, file: &Path, folder_state: Option<usize>) -> Result<Docume
         };
         match result {
             Ok(e) => document.entries.push(e),
-            Err(problem) => problems.push(problem),
+            Err(error) => problems.push(Problem { error, frame: Some((file.to_path_buf(), index)) }),
         }
     }
     document.problems = problems;
@@ -168,7 +190,7 @@ fn entry(
     f: &Fields,
     index: usize,
     folder: &Path,
-    folder_state: Option<usize>,
+    folder_state: DefaultState,
     test: &BTreeSet<String>,
 ) -> Result<Entry, CaptureError> {
     let path = |key: &str| Ok::<_, CaptureError>(f.text(key)?.map(|p| resolve(folder, p)));
@@ -185,8 +207,10 @@ fn entry(
     }
     let state = match (f.count("state")?, folder_state) {
         (Some(state), _) => state,
-        (None, Some(state)) => state,
-        (None, None) => return Err(f.missing("state", "which joint configuration the picture shows, from 0")),
+        (None, DefaultState::Is(state)) => state,
+        (None, DefaultState::None) => {
+            return Err(f.missing("state", "which joint configuration the picture shows, from 0"));
+        }
     };
     let split = if test.contains(&normal_name(file_path)) { Split::Test } else { Split::Train };
     Ok(Entry {

@@ -19,6 +19,12 @@ const FINE: usize = 4;
 /// Linear-light difference between a pixel's samples above which it is sampled finely: about 6 steps of 255.
 const DIFFERS: f32 = 0.02;
 
+/// Origin and direction (camera z 1) of the ray through the centre of pixel (x, y).
+pub(crate) fn centre_ray(camera: &Camera, x: usize, y: usize) -> (Vec3A, Vec3A) {
+    let direction = camera.ray(DVec2::new(x as f64 + 0.5, y as f64 + 0.5));
+    (Vec3A::from(camera.centre().as_vec3()), Vec3A::from(direction.as_vec3()))
+}
+
 /// Renders `scene`, whose parts stand at `poses`. `background` is linear light.
 pub(crate) fn render(scene: &Scene, looks: &Looks, poses: &[Pose], camera: &Camera, background: Vec3) -> Picture {
     let (w, h) = (camera.width, camera.height);

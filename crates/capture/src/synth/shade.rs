@@ -3,8 +3,9 @@
 //! Nothing is cast: no shadows, no highlights, so that a point keeps its colour while cameras move and changes it only
 //! mildly when its part turns, as under a cloudy sky.
 
+use super::occluder;
 use super::scene::Hit;
-use crate::object::ArticulatedObject;
+use crate::object::{ArticulatedObject, Material, PartGeometry};
 use glam::{Vec2, Vec3, Vec3A};
 
 /// Light from below and above (blended by the normal), and two soft lamps: direction to the lamp and strength.
@@ -13,9 +14,12 @@ const GROUND: f32 = 0.42;
 const SKY: f32 = 0.58;
 const LAMPS: [([f32; 3], f32); 2] = [([0.48, -0.36, 0.80], 0.28), ([-0.74, 0.56, 0.37], 0.12)];
 
-/// What shading needs per face: how many texels a unit of length covers, for the mip level.
+/// What shading needs: the parts (a hand may follow the object's own), materials, and per face how many texels a unit of
+/// length covers, for the mip level.
 pub(crate) struct Looks<'a> {
     object: &'a ArticulatedObject,
+    parts: Vec<&'a PartGeometry>,
+    materials: Vec<Material>,
     /// Linear-light colour per material.
     colors: Vec<Vec3>,
     /// log2 of texels per scene unit, per part and face.
@@ -23,40 +27,40 @@ pub(crate) struct Looks<'a> {
 }
 
 impl<'a> Looks<'a> {
-    pub fn new(object: &'a ArticulatedObject) -> Self {
+    pub fn new(object: &'a ArticulatedObject, hand: Option<&'a PartGeometry>) -> Self {
         let linear =
             |c: [f32; 3]| Vec3::from_array(c.map(|x| crate::object::texture::linear_from_srgb(x.clamp(0.0, 1.0))));
-        let colors = object.materials.iter().map(|m| linear(m.color)).collect();
-        let density = object
-            .parts
+        let parts: Vec<&PartGeometry> = object.parts.iter().chain(hand).collect();
+        let mut materials = object.materials.clone();
+        materials.push(Material { color: occluder::SKIN, texture: None });
+        let colors = materials.iter().map(|m| linear(m.color)).collect();
+        let density = parts
             .iter()
             .map(|p| {
-                let of_face = |(f, &m): (&[u32; 3], &u32)| match object.materials[m as usize].texture {
-                    Some(texture) => {
-                        let size = object.textures[texture].size();
-                        let [a, b, c] = f.map(|i| p.uvs[i as usize] * size);
-                        let texels = (b - a).perp_dot(c - a).abs();
-                        let [a, b, c] = f.map(|i| p.vertices[i as usize]);
-                        let area = (b - a).cross(c - a).length();
-                        0.5 * (texels.max(1e-6) / area.max(1e-12)).log2()
-                    }
-                    None => 0.0,
+                let of_face = |(f, &m): (&[u32; 3], &u32)| {
+                    let Some(texture) = materials[m as usize].texture else { return 0.0 };
+                    let size = object.textures[texture].size();
+                    let [a, b, c] = f.map(|i| p.uvs[i as usize] * size);
+                    let texels = (b - a).perp_dot(c - a).abs();
+                    let [a, b, c] = f.map(|i| p.vertices[i as usize]);
+                    let area = (b - a).cross(c - a).length();
+                    0.5 * (texels.max(1e-6) / area.max(1e-12)).log2()
                 };
                 p.faces.iter().zip(&p.materials).map(of_face).collect()
             })
             .collect();
-        Self { object, colors, density }
+        Self { object, parts, materials, colors, density }
     }
 
     /// Linear-light colour of a hit. `footprint` is the side of the sample's patch at the hit, scene units;
     /// `turn` rotates canonical normals into the world.
     pub fn shade(&self, hit: &Hit, direction: Vec3A, footprint: f32, turn: glam::Quat) -> Vec3 {
-        let part = &self.object.parts[hit.part];
+        let part = self.parts[hit.part];
         let corners = part.faces[hit.face].map(|i| i as usize);
         let weights = [1.0 - hit.u - hit.v, hit.u, hit.v];
         let material = part.materials[hit.face] as usize;
         let mut albedo = self.colors[material];
-        if let Some(texture) = self.object.materials[material].texture {
+        if let Some(texture) = self.materials[material].texture {
             let uv = corners.iter().zip(weights).fold(Vec2::ZERO, |sum, (&i, w)| sum + part.uvs[i] * w);
             let level = self.density[hit.part][hit.face] + footprint.log2();
             albedo *= self.object.textures[texture].sample(uv, level);

@@ -1,0 +1,236 @@
+//! Do cameras, depth, masks and states agree in space? Points of one view are carried into other views.
+
+use super::pixels::Look;
+use super::{Finding, Fix, Severity, address, error, warning};
+use crate::recording::transforms::Document;
+use crate::{CaptureError, Recording, Split};
+use glam::{DMat3, DVec3};
+use hingecast_geom::Camera;
+
+/// Factors by which depth units are mistaken: metres, centimetres, millimetres, tenths, RealSense and TUM units.
+const UNITS: [f64; 10] = [1e-4, 1e-3, 1e-2, 0.1, 0.2, 5.0, 10.0, 100.0, 1e3, 1e4];
+/// Views of a state that are compared with each other, and points of each.
+const VIEWS: usize = 8;
+const POINTS: usize = 150;
+/// Share of points that must land on the object in another view when all is well; below the second all is not.
+const AGREES: f64 = 0.7;
+const DISAGREES: f64 = 0.5;
+
+pub(super) fn check(documents: &[Document], recording: &Recording, looks: &[Option<Look>], out: &mut Vec<Finding>) {
+    one_place(recording, out);
+    if !look_inward(recording) {
+        let place = format!("{}: frames[].transform_matrix", recording.root.display());
+        let hint =
+            "nerfstudio's axes are x right, y up, z back; negate the matrices' columns 2 and 3 (OpenCV to OpenGL)";
+        let e =
+            CaptureError::new("the cameras look away from each other's middle: their axes are OpenCV's", place, hint);
+        out.push(Finding { fix: Some(Fix::FlipCameraAxes), ..error("camera-axes", e) });
+        // With wrong axes nothing below means anything.
+        return;
+    }
+    empty_depth(documents, recording, looks, out);
+    let by_state: Vec<Vec<usize>> = (0..recording.n_states).map(|s| some_views(recording, looks, s)).collect();
+    if let Some(finding) = depth_unit(recording, looks, &by_state) {
+        out.push(finding);
+        return;
+    }
+    states_apart(recording, looks, &by_state, out);
+}
+
+/// Cameras of a state that stand at one point give no depth.
+fn one_place(recording: &Recording, out: &mut Vec<Finding>) {
+    for s in 0..recording.n_states {
+        let centres: Vec<DVec3> =
+            recording.frames_of(s, Split::Train).iter().map(|&i| recording.frames[i].camera.centre()).collect();
+        let spread = centres.iter().map(|c| c.distance(centres[0])).fold(0.0, f64::max);
+        let size = centres.iter().map(|c| c.length()).fold(1e-9, f64::max);
+        if centres.len() > 2 && spread < 1e-4 * size {
+            let place =
+                format!("{}: state {s}, {} cameras at {:.3}", recording.root.display(), centres.len(), centres[0]);
+            let hint = "walk around the object, or check that the poses were exported and not the identity";
+            out.push(error("one-place", CaptureError::new("all cameras of a state stand at one place", place, hint)));
+        }
+    }
+}
+
+/// The point nearest to all optical axes should lie in front of the cameras. True also when there is no such point.
+fn look_inward(recording: &Recording) -> bool {
+    let rays: Vec<(DVec3, DVec3)> = recording
+        .frames
+        .iter()
+        .map(|f| (f.camera.centre(), f.camera.camera_from_world.inverse().rotate(DVec3::Z)))
+        .collect();
+    // Sum of (1 - d d') x = sum of (1 - d d') c.
+    let (mut a, mut b) = (DMat3::ZERO, DVec3::ZERO);
+    for (c, d) in &rays {
+        let p = DMat3::IDENTITY - DMat3::from_cols(*d * d.x, *d * d.y, *d * d.z);
+        (a, b) = (a + p, b + p * *c);
+    }
+    if rays.len() < 3 || a.determinant().abs() < 1e-6 * (rays.len() as f64).powi(3) {
+        return true;
+    }
+    let focus = a.inverse() * b;
+    let behind = rays.iter().filter(|(c, d)| (focus - *c).dot(*d) < 0.0).count();
+    behind * 10 < rays.len() * 8
+}
+
+fn empty_depth(documents: &[Document], recording: &Recording, looks: &[Option<Look>], out: &mut Vec<Finding>) {
+    for (i, look) in looks.iter().enumerate() {
+        let Some(look) = look.as_ref().filter(|l| !l.depth.is_empty()) else { continue };
+        let object = look.object.iter().filter(|&&m| m == 1).count();
+        let known = look.object.iter().zip(&look.depth).filter(|(m, d)| **m == 1 && **d > 0.0).count();
+        if object > 20 && known * 20 < object {
+            let (_, _, place) = address(documents, recording, i);
+            let path = recording.frames[i].depth.as_ref().map(|p| p.display().to_string()).unwrap_or_default();
+            let hint = "check the depth file and its unit; too near or too far for the sensor gives no depth";
+            out.push(warning(
+                "depth-empty",
+                "an image has no depth on the object".into(),
+                format!("{place}: {path}"),
+                hint,
+            ));
+        }
+    }
+}
+
+/// Frames of a state with depth, spread over its views.
+fn some_views(recording: &Recording, looks: &[Option<Look>], state: usize) -> Vec<usize> {
+    let all: Vec<usize> = recording
+        .frames_of(state, Split::Train)
+        .into_iter()
+        .filter(|&i| looks[i].as_ref().is_some_and(|l| !l.depth.is_empty()))
+        .collect();
+    let n = all.len().min(VIEWS);
+    (0..n).map(|k| all[k * all.len() / n]).collect()
+}
+
+/// Object points of a frame in camera axes, at depth times `scale`.
+fn points(look: &Look, camera: &Camera, scale: f64) -> Vec<DVec3> {
+    let good: Vec<usize> = (0..look.depth.len()).filter(|&i| look.object[i] == 1 && look.depth[i] > 0.0).collect();
+    let n = good.len().min(POINTS);
+    (0..n)
+        .map(|k| good[k * good.len() / n])
+        .map(|i| camera.unproject(look.uv(i), f64::from(look.depth[i]) * scale))
+        .collect()
+}
+
+/// How points fare in another view: on the object's silhouette; at the depth that is seen there; all.
+#[derive(Default)]
+struct Fate {
+    on_object: usize,
+    on_surface: usize,
+    all: usize,
+}
+
+fn carry(points: &[DVec3], look: &Look, camera: &Camera, scale: f64, tolerance: f64, fate: &mut Fate) {
+    for &x in points {
+        let (uv, z) = camera.project(x);
+        fate.all += 1;
+        let Some(i) = look.pixel(uv).filter(|_| z > 0.0) else { continue };
+        let seen = f64::from(look.depth[i]) * scale;
+        // Without masks everything is object: then only depth can agree.
+        let hit = if look.has_mask { look.object[i] == 1 } else { seen > 0.0 && (seen - z).abs() < 0.1 * z };
+        fate.on_object += usize::from(hit);
+        fate.on_surface += usize::from(look.object[i] == 1 && seen > 0.0 && (seen - z).abs() < tolerance);
+    }
+}
+
+/// Depth in the wrong unit: points of one view miss the object in the others, and hit it at another scale.
+fn depth_unit(recording: &Recording, looks: &[Option<Look>], by_state: &[Vec<usize>]) -> Option<Finding> {
+    let score = |scale: f64| {
+        let mut fate = Fate::default();
+        // Three states are enough, the unit is one for all.
+        for views in by_state.iter().take(3) {
+            for &i in views {
+                let from = points(looks[i].as_ref()?, &recording.frames[i].camera, scale);
+                for &j in views.iter().filter(|&&j| j != i) {
+                    carry(&from, looks[j].as_ref()?, &recording.frames[j].camera, scale, 0.0, &mut fate);
+                }
+            }
+        }
+        (fate.all > 50).then(|| fate.on_object as f64 / fate.all as f64)
+    };
+    let now = score(1.0)?;
+    if now >= DISAGREES {
+        return None;
+    }
+    let place = format!("{}: depth_unit_scale_factor", recording.root.display());
+    let best = UNITS.iter().filter_map(|&u| Some((u, score(u)?))).max_by(|a, b| a.1.total_cmp(&b.1));
+    match best {
+        Some((unit, share)) if share >= AGREES => {
+            let what = format!("depth is in the wrong unit: it agrees between views when multiplied by {unit}");
+            let place = format!("{place} = {}", recording.frames[by_state[0][0]].depth_scale);
+            let hint = "multiply depth_unit_scale_factor by that";
+            let e = CaptureError::new(what, place, hint);
+            Some(Finding { fix: Some(Fix::ScaleDepth { factor: unit }), ..error("depth-unit", e) })
+        }
+        _ => {
+            let what =
+                format!("depth and camera poses disagree: {:.0} % of points miss the object", 100.0 * (1.0 - now));
+            let hint =
+                "check poses and intrinsics (camera-to-world, OpenGL axes), and that depth is z and not ray length";
+            Some(Finding { severity: Severity::Error, ..warning("views-disagree", what, place, hint) })
+        }
+    }
+}
+
+/// A state whose cloud lies elsewhere as a whole: its points meet the surfaces of no other state, though they meet those
+/// of their own.
+fn states_apart(recording: &Recording, looks: &[Option<Look>], by_state: &[Vec<usize>], out: &mut Vec<Finding>) {
+    let n = by_state.len();
+    let clouds: Vec<Vec<Vec<DVec3>>> = by_state
+        .iter()
+        .map(|views| {
+            let of = |&i: &usize| looks[i].as_ref().map(|l| points(l, &recording.frames[i].camera, 1.0));
+            views.iter().filter_map(of).collect()
+        })
+        .collect();
+    let all: Vec<DVec3> = clouds.iter().flatten().flatten().copied().collect();
+    if n < 2 || all.len() < 100 {
+        return;
+    }
+    // A tolerance of 4 % of a typical state's extent: the lid of a closed laptop counts as its keyboard.
+    let extent = |cloud: &Vec<Vec<DVec3>>| {
+        let (lo, hi) =
+            cloud.iter().flatten().fold((DVec3::INFINITY, DVec3::NEG_INFINITY), |(l, h), &x| (l.min(x), h.max(x)));
+        if lo.x <= hi.x { (hi - lo).length() } else { 0.0 }
+    };
+    let mut extents: Vec<f64> = clouds.iter().map(extent).collect();
+    extents.sort_by(f64::total_cmp);
+    let tolerance = 0.04 * extents[n / 2];
+    let agreement = |s: usize, r: usize| {
+        let mut fate = Fate::default();
+        for (&i, from) in by_state[s].iter().zip(&clouds[s]) {
+            for &j in by_state[r].iter().filter(|&&j| s != r || j != i) {
+                if let Some(look) = &looks[j] {
+                    carry(from, look, &recording.frames[j].camera, 1.0, tolerance, &mut fate);
+                }
+            }
+        }
+        fate.on_surface as f64 / fate.all.max(1) as f64
+    };
+    // Each state against a few others, near and far; one that agrees is enough.
+    for s in 0..n {
+        let own = agreement(s, s);
+        let others = [s.wrapping_sub(1), s + 1, 0, n / 2, n - 1];
+        let best = others.into_iter().filter(|&r| r < n && r != s).map(|r| agreement(s, r)).fold(0.0, f64::max);
+        if own > 0.1 && best < SHARED_FRAME * own {
+            let place = format!("{}: state {s}", recording.root.display());
+            let what = format!(
+                "a state does not share the others' frame: {:.0} % of its surface is where they see one, {:.0} % within itself",
+                100.0 * best,
+                100.0 * own
+            );
+            let hint = "register all states together (one reconstruction over all pictures), then export again";
+            let mut finding = error("states-apart", CaptureError::new(what, place, hint));
+            // With two states nothing tells a registration that failed from an object of which most has moved.
+            if n == 2 {
+                finding.severity = Severity::Warning;
+            }
+            out.push(finding);
+        }
+    }
+}
+
+/// Even a laptop whose lid makes half of it keeps more than this share of its agreement between two states.
+const SHARED_FRAME: f64 = 0.35;

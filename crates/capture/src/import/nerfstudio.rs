@@ -1,0 +1,61 @@
+//! nerfstudio: `transforms.json`; for several states one folder each with a `transforms.json`, or frames with our `state`
+//! or a `time` of a few values. `applied_transform` is in the poses already.
+
+use super::{Lens, MaskFrom, Shot, numbers, subfolders};
+use crate::CaptureError;
+use crate::recording::camera_from_gl;
+use crate::recording::transforms::{self, DefaultState, Document};
+use hingecast_geom::Camera;
+use std::collections::BTreeMap;
+use std::path::Path;
+
+/// More different times than this are a film, not states.
+const MOST_STATES: usize = 200;
+
+pub(super) fn read(src: &Path) -> Result<Vec<Shot>, CaptureError> {
+    let single = if src.is_file() { src.to_path_buf() } else { src.join("transforms.json") };
+    let documents: Vec<Document> = if single.is_file() {
+        vec![transforms::parse(src, &single, DefaultState::Is(0))?]
+    } else {
+        let files = subfolders(src).into_iter().map(|p| p.join("transforms.json")).filter(|p| p.is_file());
+        files.enumerate().map(|(s, f)| transforms::parse(src, &f, DefaultState::Is(s))).collect::<Result<_, _>>()?
+    };
+    let mut shots = Vec::new();
+    for d in &documents {
+        if let Some(problem) = d.problems.first() {
+            return Err(problem.error.clone());
+        }
+        let says_state = d.value["frames"].as_array().is_some_and(|f| f.iter().any(|f| f.get("state").is_some()));
+        let times = if says_state || documents.len() > 1 { BTreeMap::new() } else { states_by_time(d) };
+        for e in &d.entries {
+            let i = &e.intrinsics;
+            let camera_from_world = camera_from_gl(&e.world_from_camera, &e.place)?;
+            let [k1, k2, k3, k4, p1, p2] = i.distortion;
+            let (width, height, fx, fy, cx, cy) = (i.width, i.height, i.fx, i.fy, i.cx, i.cy);
+            shots.push(Shot {
+                state: e.time.and_then(|t| times.get(&t.to_bits()).copied()).unwrap_or(e.state),
+                split: e.split,
+                camera: Camera { width, height, fx, fy, cx, cy, camera_from_world },
+                lens: Lens { k: [k1, k2, k3, k4], p: [p1, p2], fisheye: i.fisheye },
+                color: numbers::with_image_ending(e.color.clone()),
+                depth: e.depth.clone(),
+                depth_scale: e.depth_scale,
+                depth_least: 0.0,
+                mask: e.mask.clone().map_or(MaskFrom::Alpha, MaskFrom::File),
+                time: e.time,
+            });
+        }
+    }
+    Ok(shots)
+}
+
+/// States in the order of time, when there are few times. Keys are bit patterns: times >= 0 sort like their bits.
+fn states_by_time(d: &Document) -> BTreeMap<u64, usize> {
+    let mut times: Vec<f64> = d.entries.iter().filter_map(|e| e.time).collect();
+    times.sort_by(f64::total_cmp);
+    times.dedup();
+    if times.len() > MOST_STATES {
+        return BTreeMap::new();
+    }
+    times.into_iter().enumerate().map(|(s, t)| (t.to_bits(), s)).collect()
+}

@@ -1,0 +1,94 @@
+//! What to record, and what came of it.
+
+use crate::CaptureError;
+use serde::{Deserialize, Serialize};
+use std::collections::BTreeMap;
+use std::path::PathBuf;
+
+/// What to record.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct SynthConfig {
+    /// Joint configurations. 2 = everything at one end, then everything at the other.
+    pub states: usize,
+    /// Training cameras per state.
+    pub views: usize,
+    /// Held-out cameras per state.
+    pub test_views: usize,
+    /// Held-out joint configurations between recorded ones; their frames are all test frames. 0 with fewer than 3 states.
+    pub test_states: usize,
+    /// Width and height of the images, pixels.
+    pub size: usize,
+    /// Field of view, degrees; 40 is a phone's main camera upright.
+    pub fov_deg: f64,
+    /// The same cameras for all states (a rig); false: a person walks around anew for each state.
+    pub same_cameras: bool,
+    /// Joint name -> first and last value of its play, radians or scene units. Others get their useful range.
+    pub ranges: BTreeMap<String, [f64; 2]>,
+    /// sRGB behind the object.
+    pub background: [u8; 3],
+    /// What the sensor does to training frames; test frames stay clean, they measure.
+    pub noise: Noise,
+    /// Share of the training frames into which a hand and forearm reach, 0..1.
+    pub occluders: f64,
+    /// Write the truth folder beside the recording.
+    pub truth: bool,
+    pub seed: u64,
+}
+
+impl Default for SynthConfig {
+    fn default() -> Self {
+        Self {
+            states: 25,
+            views: 60,
+            test_views: 4,
+            test_states: 2,
+            size: 256,
+            fov_deg: 40.0,
+            same_cameras: true,
+            ranges: BTreeMap::new(),
+            background: [255; 3],
+            noise: Noise::None,
+            occluders: 0.0,
+            truth: true,
+            seed: 0,
+        }
+    }
+}
+
+/// Imitated sensors.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Noise {
+    #[default]
+    None,
+    /// Intel RealSense D435: see `noise.rs`.
+    D435,
+}
+
+/// What was recorded.
+#[derive(Clone, Debug)]
+pub struct SynthReport {
+    pub recording: PathBuf,
+    /// `None` when the configuration wanted none.
+    pub truth: Option<PathBuf>,
+    pub frames: usize,
+    /// Joint name, first and last value of its play.
+    pub ranges: Vec<(String, [f64; 2])>,
+}
+
+pub(super) fn validate(c: &SynthConfig) -> Result<(), CaptureError> {
+    let checks = [
+        (c.states >= 1, "states", c.states.to_string(), "1 or more; 2 and more show motion"),
+        (c.views >= 1, "views", c.views.to_string(), "1 or more; 60 is a good recording"),
+        ((8..=4096).contains(&c.size), "size", c.size.to_string(), "8 to 4096 pixels"),
+        (c.fov_deg > 5.0 && c.fov_deg < 120.0, "fov_deg", c.fov_deg.to_string(), "5 to 120 degrees"),
+        ((0.0..=1.0).contains(&c.occluders), "occluders", c.occluders.to_string(), "a share from 0 to 1"),
+    ];
+    match checks.into_iter().find(|(good, ..)| !good) {
+        None => Ok(()),
+        Some((_, key, value, hint)) => {
+            Err(CaptureError::new(format!("{key} is out of range"), format!("synth: {key} = {value}"), hint))
+        }
+    }
+}

@@ -1,0 +1,90 @@
+//! Which joint values and which cameras a recording has.
+
+use super::ranges::{UsefulRange, useful_ranges};
+use super::{SynthConfig, cameras, play};
+use crate::object::ArticulatedObject;
+use crate::{CaptureError, Split};
+use glam::DVec3;
+use hingecast_geom::Camera;
+
+/// One view to render.
+pub(super) struct Shot {
+    pub state: usize,
+    pub view: usize,
+    pub split: Split,
+    pub camera: Camera,
+}
+
+/// First and last value of each joint's play.
+pub(super) fn ranges(object: &ArticulatedObject, config: &SynthConfig) -> Result<Vec<[f64; 2]>, CaptureError> {
+    let names: Vec<&str> = object.tree.joints.iter().map(|j| j.name.as_str()).collect();
+    if let Some((name, range)) =
+        config.ranges.iter().find(|(n, r)| !names.contains(&n.as_str()) || !r.iter().all(|x| x.is_finite()))
+    {
+        let hint = format!("the joints are: {}", names.join(", "));
+        return Err(CaptureError::new(
+            "no such joint, or its range is not finite",
+            format!("--range {name}={range:?}"),
+            hint,
+        ));
+    }
+    let useful = useful_ranges(object);
+    let own = |(name, u): (&&str, &UsefulRange)| config.ranges.get(*name).copied().unwrap_or([u.lower, u.upper]);
+    Ok(names.iter().zip(&useful).map(own).collect())
+}
+
+/// Joint values of the recorded states, then of the held-out ones between them.
+pub(super) fn joint_values(config: &SynthConfig, ranges: &[[f64; 2]]) -> Vec<Vec<f64>> {
+    let mut rng = fastrand::Rng::with_seed(config.seed ^ 0x706c_6179);
+    let play = play::Play::new(ranges.len(), config.states == 2, &mut rng);
+    let last = (config.states.max(2) - 1) as f64;
+    let held_out = if config.states < 3 { 0 } else { config.test_states };
+    // Held-out states stand half-way between two recorded ones, spread over the play.
+    let between = (0..held_out).map(|k| (last * (k + 1) as f64 / (held_out + 1) as f64).floor() + 0.5);
+    let times = (0..config.states).map(|s| s as f64).chain(between).map(|s| s / last);
+    let value = |[from, to]: [f64; 2], f: f64| from + f * (to - from);
+    times.map(|t| play.fractions(t).into_iter().zip(ranges).map(|(f, &r)| value(r, f)).collect()).collect()
+}
+
+/// All views: per state the training cameras, then the held-out ones.
+pub(super) fn shots(object: &ArticulatedObject, config: &SynthConfig, states: &[Vec<f64>]) -> Vec<Shot> {
+    let fov = config.fov_deg.to_radians();
+    let subject = cameras::Subject::new(object, states);
+    let directions = |salt: u64, n: usize| {
+        cameras::directions(n, &mut fastrand::Rng::with_seed(config.seed.wrapping_mul(0x9e37_79b9) ^ salt))
+    };
+    let per_state = |state: usize| {
+        let salt = if config.same_cameras { 0 } else { state as u64 };
+        let train = if state < config.states { directions(salt, config.views) } else { Vec::new() };
+        (train, directions(1_000_003 + state as u64, config.test_views))
+    };
+    let all: Vec<_> = (0..states.len()).map(per_state).collect();
+    let every: Vec<DVec3> = all.iter().flat_map(|(train, test)| train.iter().chain(test).copied()).collect();
+    let distance = subject.distance(&every, fov);
+    let mut shots = Vec::new();
+    for (state, (train, test)) in all.iter().enumerate() {
+        let splits = train.iter().map(|d| (Split::Train, d)).chain(test.iter().map(|d| (Split::Test, d)));
+        for (view, (split, &direction)) in splits.enumerate() {
+            let camera = subject.camera(direction, distance, config.size, fov);
+            shots.push(Shot { state, view, split, camera });
+        }
+    }
+    shots
+}
+
+/// Scene units per depth step: a ten-thousandth unless the object is too far for 16 bits.
+pub(super) fn depth_scale(object: &ArticulatedObject, shots: &[Shot]) -> f64 {
+    let (lo, hi) = object.bounds(&vec![0.0; object.tree.joints.len()]);
+    let centre = 0.5 * (lo + hi);
+    let farthest =
+        shots.iter().map(|s| s.camera.centre().distance(centre)).fold(0.0, f64::max) + 2.0 * (hi - lo).length();
+    let mut scale = 1e-4;
+    while farthest / scale > 65_535.0 {
+        scale *= 10.0;
+    }
+    // Small objects (a pair of glasses in metres) deserve finer steps.
+    while farthest / (scale / 10.0) < 65_535.0 {
+        scale /= 10.0;
+    }
+    scale
+}
