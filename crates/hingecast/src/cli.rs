@@ -84,9 +84,9 @@ pub struct SynthSettings {
     /// Sensor model: `none` is exact; `d435` has depth noise, holes, colour noise, ragged masks and poses off by 0.5 deg and 3 mm.
     #[arg(long, default_value = "none", value_parser = ["none", "d435"])]
     pub noise: String,
-    /// A hand and forearm reach in on some frames.
-    #[arg(long)]
-    pub occluders: bool,
+    /// A hand and forearm reach in on this share of the training frames [default without a value: 0.2].
+    #[arg(long, value_name = "SHARE", num_args = 0..=1, default_missing_value = "0.2")]
+    pub occluders: Option<f64>,
     /// Play of a joint: NAME=FROM:TO in radians or scene units; may be repeated [default: its useful range].
     #[arg(long = "range", value_name = "JOINT=FROM:TO")]
     pub ranges: Vec<String>,

@@ -4,7 +4,7 @@ use super::{Outcome, Session};
 use crate::cli::{Synth, SynthSettings};
 use hingecast::failure::{Failure, Result};
 use hingecast_capture::object::ArticulatedObject;
-use hingecast_capture::synth::{SynthConfig, SynthReport, synth};
+use hingecast_capture::synth::{Noise, SynthConfig, SynthReport, synth};
 use std::collections::BTreeMap;
 use std::path::Path;
 
@@ -29,6 +29,8 @@ pub fn config(settings: &SynthSettings, truth: bool) -> Result<SynthConfig> {
         views: settings.views,
         test_views: settings.test_views,
         size: settings.size,
+        noise: if settings.noise == "d435" { Noise::D435 } else { Noise::None },
+        occluders: settings.occluders.unwrap_or(0.0),
         ranges,
         truth,
         seed: settings.seed,
