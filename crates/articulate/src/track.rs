@@ -58,6 +58,9 @@ pub fn neighbours(means: &[[f32; 3]], k: usize) -> Vec<Vec<u32>> {
         .collect()
 }
 
+/// Keeps a finished state: its number, means, quaternions.
+pub type Save<'a, E> = dyn FnMut(usize, &[[f32; 3]], &[[f32; 4]]) -> Result<(), E> + 'a;
+
 /// Tracks `first` (state 0) through all states. `targets(s)` gives the training views of state s; `done` holds the
 /// states of an earlier, interrupted run; `save(s, means, quats)` is called after each state.
 ///
@@ -69,7 +72,7 @@ pub fn run<E: From<SplatError> + From<Cancelled>>(
     diagonal: f64,
     targets: &dyn Fn(usize) -> Result<Vec<Target>, E>,
     done: Trajectories,
-    save: &mut dyn FnMut(usize, &[[f32; 3]], &[[f32; 4]]) -> Result<(), E>,
+    save: &mut Save<E>,
     config: &Config,
     seed: u64,
     threads: usize,

@@ -104,6 +104,7 @@ impl Config {
                 )
             })?;
             merge(&mut table, given);
+            typed(&table, &path.display().to_string())?;
         }
         for pair in set {
             let (key, value) = pair.split_once('=').ok_or_else(|| {
@@ -121,16 +122,59 @@ impl Config {
             if let toml::Value::Table(t) = nested {
                 merge(&mut table, t);
             }
+            typed(&table, &format!("--set {pair}"))?;
         }
-        toml::Value::Table(table).try_into().map_err(|e: toml::de::Error| {
-            let place = file.map_or("--set".to_string(), |f| f.display().to_string());
-            Failure::new(
-                e.message().lines().collect::<Vec<_>>().join("; "),
-                place,
-                "see config.toml of any run for all keys",
-            )
-        })
+        let config = typed(&table, "--set, --config")?;
+        config.check()?;
+        Ok(config)
     }
+
+    /// Refuses values that no stage can work with.
+    fn check(&self) -> Result<()> {
+        let from = |least: usize| (least as f64, f64::INFINITY);
+        let share = (0.0, 1.0);
+        // Positive means above this: a voxel of nothing would fill any memory.
+        let (finest, coarsest) = (1.0 / 2048.0, 0.2);
+        let checks = [
+            ("memory_mb", self.memory_mb as f64, from(1), "MB"),
+            ("fit.gaussians", self.fit.gaussians as f64, (100.0, 1e7), "a number"),
+            ("fit.steps", self.fit.steps as f64, from(1), "steps"),
+            ("track.steps", self.track.steps as f64, from(1), "steps per state"),
+            ("track.rate[0]", self.track.rate[0] as f64, share, "share of the diagonal"),
+            ("track.rate[1]", self.track.rate[1] as f64, share, "share of the diagonal"),
+            ("parts.parts", self.parts.parts as f64, (0.0, 250.0), "a number, 0 = find out"),
+            ("parts.max_parts", self.parts.max_parts as f64, (1.0, 250.0), "a number"),
+            ("parts.sample", self.parts.sample as f64, (50.0, 20_000.0), "gaussians"),
+            ("parts.min_share", self.parts.min_share, share, "share of the gaussians"),
+            ("parts.noise", self.parts.noise, share, "share of the diagonal"),
+            ("joints.lattice", self.joints.lattice, (0.001, 1.0), "share of the diagonal"),
+            ("joints.margin", self.joints.margin, (0.0, 2.0), "share of the diagonal"),
+            ("joints.prismatic_share", self.joints.prismatic_share, share, "share"),
+            ("twin.voxel", self.twin.voxel, (finest, coarsest), "share of the diagonal"),
+            ("twin.density", self.twin.density, (1e-3, 1e6), "kg/m^3"),
+            ("twin.max_faces", self.twin.max_faces as f64, from(4), "faces"),
+            ("twin.max_hulls", self.twin.max_hulls as f64, (1.0, 1024.0), "hulls"),
+            ("twin.simplify_error", self.twin.simplify_error, share, "share of the diagonal"),
+            ("twin.crumbs", self.twin.crumbs, share, "share of the largest piece"),
+        ];
+        match checks.into_iter().find(|(_, value, (lo, hi), _)| !(value >= lo && value <= hi)) {
+            None => Ok(()),
+            Some((key, value, (lo, hi), unit)) => {
+                let range = if hi.is_finite() { format!("{lo} to {hi}") } else { format!("{lo} or more") };
+                let hint = format!("{key} = {range} ({unit})");
+                Err(Failure::new("a setting is out of range", format!("{key} = {value}"), hint))
+            }
+        }
+    }
+}
+
+/// The table as a config; `place` is where its last keys came from.
+fn typed(table: &toml::Table, place: &str) -> Result<Config> {
+    toml::Value::Table(table.clone()).try_into().map_err(|e: toml::de::Error| {
+        let what = e.message().lines().collect::<Vec<_>>().join("; ");
+        let what = what.replace("usize", "a whole number from 0").replace("u32", "a whole number from 0");
+        Failure::new(what, place, "see config.toml of any run for all keys")
+    })
 }
 
 fn merge(into: &mut toml::Table, from: toml::Table) {
@@ -163,5 +207,21 @@ mod tests {
     fn unknown_keys_are_named() {
         let e = Config::resolve(Preset::Default, None, &["fit.stepz=9".into()]).unwrap_err();
         assert!(e.what.contains("stepz"), "{e}");
+        assert_eq!(e.place, "--set fit.stepz=9");
+    }
+
+    #[test]
+    fn settings_that_no_stage_can_work_with_are_refused() {
+        for pair in ["fit.steps=0", "twin.voxel=0", "twin.voxel=nan", "twin.density=-1", "parts.sample=1"] {
+            let e = Config::resolve(Preset::Default, None, &[pair.to_string()]).unwrap_err();
+            assert!(e.place.starts_with(pair.split('=').next().unwrap()), "{e}");
+        }
+    }
+
+    #[test]
+    fn every_preset_is_in_range() {
+        for preset in [Preset::Fast, Preset::Default, Preset::Best] {
+            Config::resolve(preset, None, &[]).unwrap();
+        }
     }
 }

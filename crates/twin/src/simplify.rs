@@ -12,7 +12,8 @@ pub fn simplify(mesh: &TriMesh, max_faces: usize, max_error: f32) -> TriMesh {
     let Ok(adapter) = meshopt::VertexDataAdapter::new(bytes, 12, 0) else { return mesh.clone() };
     let indices: Vec<u32> = mesh.faces.iter().flatten().copied().collect();
     let options = meshopt::SimplifyOptions::ErrorAbsolute;
-    let kept = meshopt::simplify(&indices, &adapter, max_faces * 3, max_error, options, None);
+    // More than there are makes the C++ side abort.
+    let kept = meshopt::simplify(&indices, &adapter, (max_faces * 3).min(indices.len()), max_error, options, None);
     compact(mesh, &kept)
 }
 
@@ -36,4 +37,16 @@ fn compact(mesh: &TriMesh, indices: &[u32]) -> TriMesh {
         out.faces.push(f);
     }
     out
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use glam::Vec3;
+
+    #[test]
+    fn a_mesh_with_fewer_faces_than_asked_for_is_left_alone() {
+        let mesh = TriMesh::cuboid(Vec3::ZERO, Vec3::ONE);
+        assert_eq!(simplify(&mesh, 20_000, 1e-6).faces.len(), 12);
+    }
 }

@@ -69,6 +69,13 @@ pub fn evaluate(run: &Path, truth: &Path, progress: &Progress) -> Result<Evaluat
             "give the truth of this run's recording: <RECORDING>.truth",
         ));
     }
+    if recording.name != truth.object {
+        return Err(Failure::new(
+            format!("the recording shows '{}', the truth is of '{}'", recording.name, truth.object),
+            truth.root.display().to_string(),
+            "give the truth of this run's recording: <RECORDING>.truth",
+        ));
+    }
     let cache = ViewCache::new(&recording, 512 << 20);
 
     // Everything in the reference state, world frame: state 0.

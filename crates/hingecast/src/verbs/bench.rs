@@ -6,9 +6,10 @@ use hingecast::eval::{Evaluation, evaluate};
 use hingecast::failure::{Failure, Result};
 use hingecast::pipeline::{self, Span};
 use hingecast::report;
-use hingecast::stage::{read_json, write_json};
+use hingecast::stage::{RunFolder, read_json, write_json};
 use hingecast_capture::Truth;
 use hingecast_capture::object::ArticulatedObject;
+use hingecast_capture::synth::SynthConfig;
 use std::path::{Path, PathBuf};
 
 /// Object names of the suites, sorted.
@@ -50,8 +51,13 @@ fn listed(folder: &Path) -> Vec<String> {
 
 pub fn run(session: &Session, args: &Bench) -> Result<Outcome> {
     let names = objects(&args.suite)?;
-    let synth_config = synth::config(&args.synth, true)?;
+    // A name that is not there, or a baseline, is noticed now and not after an hour.
+    for name in &names {
+        ArticulatedObject::resolve(name)?;
+    }
+    let synth_config = synth::config(&args.synth, args.recording_seed, true)?;
     let build_config = build::config(&args.build)?;
+    let before: Option<Vec<Evaluation>> = args.against.as_deref().map(read_json).transpose()?;
     let mut evaluations: Vec<Evaluation> = Vec::new();
     for name in &names {
         session.ui.say(&format!("== {name}"));
@@ -63,7 +69,7 @@ pub fn run(session: &Session, args: &Bench) -> Result<Outcome> {
             }
             Err(failure) if failure.cancelled => return Err(failure),
             // One broken object must not hide the others' figures.
-            Err(failure) => session.ui.say(&format!("error: {failure}")),
+            Err(failure) => eprintln!("error: {failure}"),
         }
         if args.tidy {
             let _ = std::fs::remove_dir_all(&recording);
@@ -76,8 +82,8 @@ pub fn run(session: &Session, args: &Bench) -> Result<Outcome> {
     std::fs::write(&path, &text).map_err(Failure::io(&path))?;
     session.answer(&evaluations);
     let mut outcome = if evaluations.len() < names.len() { Outcome::UnderBar } else { Outcome::Done };
-    if let Some(baseline) = &args.against {
-        let worse = compare(&read_json::<Vec<Evaluation>>(baseline)?, &evaluations);
+    if let Some(before) = &before {
+        let worse = compare(before, &evaluations);
         worse.iter().for_each(|w| session.ui.say(&format!("worse: {w}")));
         if !worse.is_empty() {
             outcome = Outcome::UnderBar;
@@ -91,15 +97,26 @@ fn one(
     name: &str,
     recording: &Path,
     run: &Path,
-    synth_config: &hingecast_capture::synth::SynthConfig,
+    synth_config: &SynthConfig,
     build_config: &hingecast::config::Config,
 ) -> Result<Evaluation> {
-    if !recording.join("transforms.json").exists() {
-        synth::record(session, name, synth_config, recording)?;
-    }
+    record_once(session, name, synth_config, recording)?;
+    RunFolder::may_become_run(run)?;
     let folder = pipeline::build(recording, run, build_config, session.threads, &Span::default(), &session.ui)?;
     report::write(&folder)?;
     evaluate(run, &Truth::folder_of(recording), &session.ui.stage("eval"))
+}
+
+/// Records, unless the same object lies there recorded with the same settings.
+fn record_once(session: &Session, name: &str, config: &SynthConfig, recording: &Path) -> Result<()> {
+    let note = recording.with_extension("synth.json");
+    let settings = serde_json::to_value(config).expect("plain data");
+    let noted: Option<serde_json::Value> = std::fs::read(&note).ok().and_then(|b| serde_json::from_slice(&b).ok());
+    if noted.as_ref() == Some(&settings) && recording.join("transforms.json").exists() {
+        return Ok(());
+    }
+    synth::record(session, name, config, recording)?;
+    write_json(&note, &settings)
 }
 
 /// What got clearly worse: beyond the spread between seeds, not beyond the last digit.

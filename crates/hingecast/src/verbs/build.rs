@@ -3,9 +3,10 @@
 use super::{Outcome, Session};
 use crate::cli::{Build, BuildSettings};
 use hingecast::config::Config;
-use hingecast::failure::Result;
-use hingecast::pipeline::{self, Span};
+use hingecast::failure::{Failure, Result};
+use hingecast::pipeline::{self, STAGES, Span};
 use hingecast::report;
+use hingecast::stage::RunFolder;
 use std::path::{Path, PathBuf};
 
 pub fn config(settings: &BuildSettings) -> Result<Config> {
@@ -24,11 +25,35 @@ pub fn run_folder(out: Option<&Path>, recording: &Path) -> PathBuf {
     out.map_or_else(|| Path::new("runs").join(name), Path::to_path_buf)
 }
 
+/// Stage names that are not there, and `--from` after `--to`: it would do nothing and say that it is done. Asked
+/// before anything is thrown away.
+fn refuse_odd_span(args: &Build) -> Result<()> {
+    let refuse = |what: String| {
+        Err(Failure::new(what, "--from / --to", format!("the stages are, in order: {}", STAGES.join(", "))))
+    };
+    let place = |name: &str| STAGES.iter().position(|s| *s == name);
+    for name in [&args.from, &args.to].into_iter().flatten() {
+        if place(name).is_none() {
+            return refuse(format!("no stage '{name}'"));
+        }
+    }
+    match (&args.from, &args.to) {
+        (Some(from), Some(to)) if place(from) > place(to) => {
+            refuse(format!("'{from}' comes after '{to}': nothing is left to do"))
+        }
+        _ => Ok(()),
+    }
+}
+
 pub fn run(session: &Session, args: &Build) -> Result<Outcome> {
     let out = run_folder(args.out.as_deref(), &args.recording);
+    RunFolder::may_become_run(&out)?;
+    refuse_odd_span(args)?;
     let span = Span { from: args.from.clone(), to: args.to.clone(), fresh: args.fresh };
     let run = pipeline::build(&args.recording, &out, &config(&args.settings)?, session.threads, &span, &session.ui)?;
-    if args.to.as_deref().is_some_and(|to| to != "twin") {
+    if let Some(to) = args.to.as_deref().filter(|to| *to != "twin") {
+        session.ui.say(&format!("stopped after {to}, as asked; run again without --to for the twin"));
+        session.answer(&serde_json::json!({ "run": run.root, "to": to, "secs": run.record.total_secs() }));
         return Ok(Outcome::Done);
     }
     let page = report::write(&run)?;

@@ -7,11 +7,16 @@ use hingecast::eval::evaluate;
 use hingecast::failure::Result;
 use hingecast::pipeline::{self, Span};
 use hingecast::report;
+use hingecast::stage::RunFolder;
 use hingecast_capture::Truth;
 use hingecast_capture::synth::SynthConfig;
+use std::path::Path;
 
 pub fn run(session: &Session, args: &Demo) -> Result<Outcome> {
-    let (recording, run) = (args.out.join("recording"), args.out.join("run"));
+    let name = Path::new(&args.object).file_name().unwrap_or("object".as_ref());
+    let out = args.out.clone().unwrap_or_else(|| Path::new("runs/demo").join(name));
+    let (recording, run) = (out.join("recording"), out.join("run"));
+    RunFolder::may_become_run(&run)?;
     if !recording.join("transforms.json").exists() {
         let config = SynthConfig { states: 12, views: 40, size: 192, ..Default::default() };
         synth::record(session, &args.object, &config, &recording)?;

@@ -8,7 +8,7 @@ use hingecast_capture::synth::{Noise, SynthConfig, SynthReport, synth};
 use std::collections::BTreeMap;
 use std::path::Path;
 
-pub fn config(settings: &SynthSettings, truth: bool) -> Result<SynthConfig> {
+pub fn config(settings: &SynthSettings, seed: u64, truth: bool) -> Result<SynthConfig> {
     let mut ranges = BTreeMap::new();
     for text in &settings.ranges {
         let parsed = text.split_once('=').and_then(|(name, range)| {
@@ -33,7 +33,7 @@ pub fn config(settings: &SynthSettings, truth: bool) -> Result<SynthConfig> {
         occluders: settings.occluders.unwrap_or(0.0),
         ranges,
         truth,
-        seed: settings.seed,
+        seed,
         ..Default::default()
     })
 }
@@ -45,7 +45,7 @@ pub fn record(session: &Session, object: &str, config: &SynthConfig, out: &Path)
 
 pub fn run(session: &Session, args: &Synth) -> Result<Outcome> {
     let start = std::time::Instant::now();
-    let report = record(session, &args.object, &config(&args.settings, !args.no_truth)?, &args.out)?;
+    let report = record(session, &args.object, &config(&args.settings, args.seed, !args.no_truth)?, &args.out)?;
     let secs = start.elapsed().as_secs_f64();
     session.ui.say(&format!("{} images in {secs:.1} s -> {}", report.frames, report.recording.display()));
     for (name, [from, to]) in &report.ranges {

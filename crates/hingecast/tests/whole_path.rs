@@ -1,0 +1,120 @@
+//! From an object to the report, by the commands of the README.
+
+mod common;
+
+use common::{TINY, assert_finite, assert_same_bytes, files, hingecast, tiny_recording};
+use std::path::Path;
+
+/// The paths that a page refers to by `src` or `href`.
+fn references(html: &str) -> Vec<String> {
+    ["src=\"", "href=\""]
+        .iter()
+        .flat_map(|key| html.split(key).skip(1))
+        .map(|rest| rest.split('"').next().unwrap_or_default().to_string())
+        .collect()
+}
+
+fn text(path: &Path) -> String {
+    std::fs::read_to_string(path).unwrap_or_else(|e| panic!("{}: {e}", path.display()))
+}
+
+#[test]
+fn synth_check_build_eval_report() {
+    let dir = tempfile::tempdir().unwrap();
+    let dir = dir.path();
+    tiny_recording(dir);
+    for file in ["rec/transforms.json", "rec.truth/truth.json"] {
+        assert!(dir.join(file).is_file(), "{file}");
+    }
+
+    // A recording fresh from `synth` is in order.
+    let checked = hingecast(dir, "check rec --json").done();
+    let json = checked.json();
+    let errors = json["findings"].as_array().unwrap().iter().filter(|f| f["severity"] == "error").count();
+    assert_eq!(errors, 0, "{checked}");
+    assert_eq!(json["states"].as_array().unwrap().len(), 5 + 2, "five states and two held-out ones: {checked}");
+
+    let built = hingecast(dir, &format!("build rec -o run --json {TINY}")).done();
+    let answer = built.json();
+    assert!(answer["secs"].as_f64().unwrap() > 0.0 && answer["peak_memory"].as_f64().unwrap() > 1e6, "{built}");
+    let twin = dir.join("run/twin");
+    for file in ["config.toml", "run.json", "splat/gaussians.ply", "twin/twin.json", "twin/splats/part_0.ply"] {
+        assert!(dir.join("run").join(file).is_file(), "{file}\n{built}");
+    }
+
+    // Somebody else's program loads both files.
+    #[cfg(feature = "mujoco")]
+    for check in hingecast_sim::check_twin(&twin, &hingecast_sim::CheckConfig::default()).unwrap() {
+        assert!(check.finite, "{check:?}");
+        assert!(check.geoms > 0, "{check:?}");
+        assert_eq!(check.warnings, Vec::<String>::new(), "{}", check.file);
+    }
+    // Every mesh file that the robots name is there; urdf and mjcf name the same joints.
+    let (urdf, mjcf) = (text(&twin.join("robot.urdf")), text(&twin.join("robot.xml")));
+    let meshes: Vec<&str> = urdf.split("filename=\"").skip(1).map(|r| r.split('"').next().unwrap()).collect();
+    assert!(!meshes.is_empty());
+    for mesh in meshes {
+        assert!(twin.join(mesh).is_file(), "{mesh} of robot.urdf");
+    }
+    let json: serde_json::Value = serde_json::from_str(&text(&twin.join("twin.json"))).unwrap();
+    for joint in json["tree"]["joints"].as_array().unwrap() {
+        let name = format!("name=\"{}\"", joint["name"].as_str().unwrap());
+        assert!(urdf.contains(&name) && mjcf.contains(&name), "{name}");
+    }
+
+    let evaluated = hingecast(dir, "eval run --truth rec.truth --json").done();
+    let figures = evaluated.json();
+    assert_finite(&figures, "eval");
+    assert_eq!(figures["object"], "hinged_box");
+    assert_eq!(figures["joints"].as_array().unwrap().len(), 1);
+    assert!(figures["first_state"]["psnr"].as_f64().unwrap() > 15.0, "{evaluated}");
+    assert!(dir.join("run/eval.json").is_file());
+
+    // An unreachable bar: exit 1, and the figures are printed all the same.
+    let barred = hingecast(dir, "eval run --truth rec.truth --fail-under psnr=99");
+    assert_eq!(barred.code, Some(1), "{barred}");
+    assert!(barred.stderr.contains("psnr=99"), "{barred}");
+
+    std::fs::remove_dir_all(dir.join("run/report")).unwrap();
+    let page = dir.join("run/report/index.html");
+    assert_eq!(hingecast(dir, "report run --json").done().json()["report"], "run/report/index.html");
+    let html = text(&page);
+    assert!(html.contains("class=\"doubts\"") || html.contains("class=\"fine\""), "the doubts come first");
+    let pictures = references(&html);
+    assert!(pictures.len() >= 3, "{pictures:?}");
+    for file in pictures {
+        assert!(!file.contains("://"), "the report needs no network: {file}");
+        assert!(dir.join("run/report").join(&file).is_file(), "{file} is not there");
+    }
+
+    // The same command again changes nothing and is quick about it.
+    let again = hingecast(dir, &format!("build rec -o run {TINY}")).done();
+    assert_eq!(again.stderr.matches("kept").count(), 5, "{again}");
+}
+
+/// Style point 9: the bytes do not depend on the number of threads. All files of the run but those that tell of time.
+#[test]
+fn one_thread_or_two_give_the_same_bytes() {
+    let dir = tempfile::tempdir().unwrap();
+    let dir = dir.path();
+    tiny_recording(dir);
+    for threads in [1, 2] {
+        hingecast(dir, &format!("build rec -o run{threads} --threads {threads} -q {TINY}")).done();
+    }
+    assert!(files(&dir.join("run1/twin")).len() > 10);
+    for stage in ["splat", "motion", "parts", "joints", "twin"] {
+        assert_same_bytes(&dir.join("run1").join(stage), &dir.join("run2").join(stage));
+    }
+}
+
+#[test]
+fn another_seed_gives_another_twin() {
+    let dir = tempfile::tempdir().unwrap();
+    let dir = dir.path();
+    tiny_recording(dir);
+    let build = |seed: u64| {
+        hingecast(dir, &format!("build rec -o run{seed} --seed {seed} --to splat -q {TINY}")).done();
+        std::fs::read(dir.join(format!("run{seed}/splat/gaussians.ply"))).unwrap()
+    };
+    assert_ne!(build(1), build(2));
+}

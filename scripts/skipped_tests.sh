@@ -1,0 +1,10 @@
+#!/usr/bin/env bash
+# Names the tests that skipped, from the log of `cargo test -- --show-output`: they print a line "skipped: <why>".
+set -euo pipefail
+awk '
+  /^---- .* stdout ----$/ { test = $2 }
+  /^skipped: / { reason = substr($0, 10); count++; list = list "  " test ": " reason "\n" }
+  END {
+    if (count) printf "%d tests skipped:\n%s", count, list
+    else print "no test skipped"
+  }' "$1"
