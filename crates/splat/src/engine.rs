@@ -5,6 +5,7 @@ use crate::error::{SplatError, check_finite, check_len};
 use crate::frame::FrameBuffers;
 use crate::kernels::{Kernels, Simd, kernels};
 use crate::loss::{LossConfig, LossTerms};
+use crate::median::Hit;
 use crate::params::{PAD, Planes, plane};
 use crate::pool::Pool;
 use crate::project::{CHUNK, PlaneTable};
@@ -240,6 +241,17 @@ impl Engine {
             alpha: plane(4).map(|t| 1.0 - t).collect(),
             extra: (0..options.channels).flat_map(|c| plane(PLANES + c)).collect(),
         })
+    }
+
+    /// The gaussian that each pixel of the last render shows: where half of the light is gone. (h, w)
+    ///
+    /// # Errors
+    /// Nothing was rendered since the parameters changed.
+    pub fn median(&mut self) -> Result<Vec<Option<Hit>>, SplatError> {
+        if self.rendered.is_none() {
+            return Err(SplatError::NotRendered);
+        }
+        Ok(self.buffers.median(&mut self.pool))
     }
 
     /// Renders into the buffers.

@@ -4,6 +4,7 @@ use crate::bins::{self, Entry, Order};
 use crate::error::SplatError;
 use crate::kernels::Kernels;
 use crate::loss::{self, BandSums, LossConfig, LossTerms};
+use crate::median::{Hit, median};
 use crate::params::Planes;
 use crate::pool::{Pool, Shards};
 use crate::project::{self, CHUNK, PlaneTable, Splat};
@@ -107,6 +108,11 @@ impl FrameBuffers {
         let draw = if self.channels > 0 { kernels.forward_extra } else { kernels.forward };
         pool.run(tiles, |i| unsafe { draw(&args, i) });
         Ok(())
+    }
+
+    /// What every pixel of the last forward pass shows. (h, w)
+    pub fn median(&self, pool: &mut Pool) -> Vec<Option<Hit>> {
+        median(pool, &self.view, &self.splats, &self.tiles, &self.image)
     }
 
     /// Loss of `image` against `target`; fills the gradient's first five planes.

@@ -10,6 +10,7 @@ use glam::{DVec3, Vec3};
 use hingecast_geom::{Cancelled, Pose};
 use rayon::prelude::*;
 use std::collections::BTreeMap;
+use std::sync::atomic::{AtomicU32, Ordering};
 
 /// Voxels per block edge.
 const B: i32 = 8;
@@ -18,6 +19,10 @@ const BLOCK: usize = (B * B * B) as usize;
 const MIN_HITS: u32 = 3;
 /// Rays that must agree before space without any surface counts as empty.
 const MIN_EMPTY: u16 = 2;
+/// A sheet thinner than a voxel: its front and back, averaged, leave nothing negative. Voxels with this many
+/// surface pixels whose average distance to the surface is below three quarters of a voxel are kept all the same.
+const SHEET_HITS: u32 = 4;
+const SHEET_VALUE: f32 = 0.25;
 
 type Key = [i32; 3];
 
@@ -37,6 +42,15 @@ struct Block {
     key: Key,
     sum: Vec<f32>,
     weight: Vec<f32>,
+    /// Surface pixels that fell into each voxel.
+    hits: Vec<AtomicU32>,
+}
+
+impl Block {
+    fn new(key: Key) -> Self {
+        let hits = (0..BLOCK).map(|_| AtomicU32::new(0)).collect();
+        Self { key, sum: vec![0.0; BLOCK], weight: vec![0.0; BLOCK], hits }
+    }
 }
 
 /// Signed distance on a dense grid, in units of the truncation: -1 inside .. +1 outside.
@@ -102,7 +116,7 @@ impl PartVolume {
                 self.hi[a] = self.hi[a].max(k[a]);
             }
         }
-        self.blocks = keys.iter().map(|&key| Block { key, sum: vec![0.0; BLOCK], weight: vec![0.0; BLOCK] }).collect();
+        self.blocks = keys.iter().map(|&key| Block::new(key)).collect();
         for z in self.lo[0]..=self.hi[0] {
             for y in self.lo[1]..=self.hi[1] {
                 for x in self.lo[2]..=self.hi[2] {
@@ -128,6 +142,8 @@ impl PartVolume {
                 }
             }
         });
+        let blocks = &self.blocks;
+        batch.par_iter().zip(world_from_canonical).for_each(|(seen, pose)| count_hits(blocks, seen, pose, part, voxel));
         self.hollow.par_iter_mut().for_each(|(key, empty)| {
             let centre = (Vec3::new(key[2] as f32, key[1] as f32, key[0] as f32) + 0.5) * size;
             for view in &views {
@@ -171,6 +187,7 @@ impl PartVolume {
             fill(key, &|_| if *empty >= MIN_EMPTY { Some(1.0) } else { None });
         }
         let (origin, voxel) = (field.origin, field.voxel);
+        self.keep_sheets(&mut field);
         field.values.par_iter_mut().enumerate().for_each(|(i, value)| {
             if !field.known[i] {
                 let (x, y, z) = (i % dims[0], i / dims[0] % dims[1], i / (dims[0] * dims[1]));
@@ -180,6 +197,56 @@ impl PartVolume {
             }
         });
         field
+    }
+
+    /// Makes voxels of sheets solid that the average of front and back has lost.
+    fn keep_sheets(&self, field: &mut Field) {
+        let mut lost = Vec::new();
+        for b in &self.blocks {
+            for i in 0..BLOCK {
+                let near = b.weight[i] > 0.0 && (0.0..SHEET_VALUE).contains(&(b.sum[i] / b.weight[i]));
+                if !near || b.hits[i].load(Ordering::Relaxed) < SHEET_HITS {
+                    continue;
+                }
+                let at = |k: i32, lo: i32, d: usize| ((k - lo) * B) as usize + d + 1;
+                let (x, y, z) = (
+                    at(b.key[2], self.lo[2], i % 8),
+                    at(b.key[1], self.lo[1], i / 8 % 8),
+                    at(b.key[0], self.lo[0], i / 64),
+                );
+                // The grid has an empty border, so x - 1 .. x + 1 exist.
+                let solid_beside = (z - 1..=z + 1).any(|z| {
+                    (y - 1..=y + 1).any(|y| (x - 1..=x + 1).any(|x| field.values[field.index(x, y, z)] < 0.0))
+                });
+                if !solid_beside {
+                    lost.push(field.index(x, y, z));
+                }
+            }
+        }
+        for i in lost {
+            // Half a voxel inside.
+            field.values[i] = -1.0 / 6.0;
+        }
+    }
+}
+
+/// Counts the part's surface pixels per voxel. Sums of integers: the order of threads does not matter.
+fn count_hits(blocks: &[Block], seen: &Observation, world_from_canonical: &Pose, part: u8, voxel: f32) {
+    let c = &seen.camera;
+    let canonical_from_camera = world_from_canonical.inverse() * c.camera_from_world.inverse();
+    for (i, &label) in seen.labels.iter().enumerate() {
+        let depth = seen.depth[i];
+        if label != part || !(depth > 0.0) {
+            continue;
+        }
+        let (u, v) = ((i % c.width) as f64 + 0.5, (i / c.width) as f64 + 0.5);
+        let ray = DVec3::new((u - c.cx) / c.fx, (v - c.cy) / c.fy, 1.0);
+        let x = (canonical_from_camera.apply(ray * depth as f64) / voxel as f64).floor().as_ivec3();
+        let key = [x.z.div_euclid(B), x.y.div_euclid(B), x.x.div_euclid(B)];
+        if let Ok(b) = blocks.binary_search_by_key(&key, |b| b.key) {
+            let inner = (x.z.rem_euclid(B) * B + x.y.rem_euclid(B)) * B + x.x.rem_euclid(B);
+            blocks[b].hits[inner as usize].fetch_add(1, Ordering::Relaxed);
+        }
     }
 }
 

@@ -56,7 +56,7 @@ pub fn errors(
     let found = joints::load(&run.root)?;
     let cache = ViewCache::new(recording, 64 << 20);
     let background = splat::background(recording, &cache)?;
-    let mut labeller = Labeller::new(&gaussians, &found.labels, tree.parts.len(), run.record.threads)?;
+    let mut labeller = Labeller::new(&gaussians, &found.labels, run.record.threads)?;
     let (mut first, mut others) = (PictureErrors::default(), PictureErrors::default());
     for state in 0..recording.n_states {
         progress.check()?;

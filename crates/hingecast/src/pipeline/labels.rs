@@ -1,4 +1,4 @@
-//! Part labels per pixel: the gaussians rendered with their part as an extra channel.
+//! Part labels per pixel: the gaussians rendered, each pixel given the part of the gaussian that it shows.
 
 use crate::failure::Result;
 use hingecast_capture::View;
@@ -9,27 +9,24 @@ use hingecast_twin::{BACKGROUND, UNKNOWN};
 /// Gaussians with parts, posed by a tree, ready to be rendered.
 pub struct Labeller {
     engine: Engine,
-    one_hot: Vec<f32>,
-    n_parts: usize,
     groups: Vec<u16>,
 }
 
-/// Colour, depth (0 = nothing) and the most likely part (`BACKGROUND` = nothing) of every pixel.
+/// What the twin looks like from a camera. (h, w)
 pub struct Picture {
+    /// (h, w, 3), 0..1
     pub rgb: Vec<f32>,
+    /// Median depth, scene units, 0 = nothing.
     pub depth: Vec<f32>,
     pub alpha: Vec<f32>,
+    /// Part, [`BACKGROUND`] = nothing.
     pub parts: Vec<u8>,
 }
 
 impl Labeller {
-    pub fn new(gaussians: &Gaussians, labels: &[u8], n_parts: usize, threads: usize) -> Result<Self> {
-        let mut one_hot = vec![0.0; gaussians.len() * n_parts];
-        for (i, l) in labels.iter().enumerate() {
-            one_hot[i * n_parts + *l as usize] = 1.0;
-        }
+    pub fn new(gaussians: &Gaussians, labels: &[u8], threads: usize) -> Result<Self> {
         let groups = labels.iter().map(|l| *l as u16).collect();
-        Ok(Self { engine: Engine::from_gaussians(gaussians, threads)?, one_hot, n_parts, groups })
+        Ok(Self { engine: Engine::from_gaussians(gaussians, threads)?, groups })
     }
 
     /// Moves the parts to where the tree has them with joint values `q`.
@@ -38,20 +35,15 @@ impl Labeller {
     }
 
     pub fn render(&mut self, camera: &Camera, background: [f32; 3]) -> Result<Picture> {
-        let options = RenderOptions { background, extra: &self.one_hot, channels: self.n_parts };
-        let render = self.engine.render(camera, &options)?;
-        let n = camera.width * camera.height;
-        let parts = (0..n)
-            .map(|i| {
-                if render.alpha[i] < 0.5 {
-                    return BACKGROUND;
-                }
-                let share = |p: &usize| render.extra[p * n + i];
-                (0..self.n_parts).max_by(|a, b| share(a).total_cmp(&share(b))).unwrap_or(0) as u8
-            })
-            .collect();
-        let depth = render.depth_normalised();
-        Ok(Picture { rgb: render.rgb, depth, alpha: render.alpha, parts })
+        let render = self.engine.render(camera, &RenderOptions { background, ..Default::default() })?;
+        let hits = self.engine.median()?;
+        let part = |h: hingecast_splat::Hit| self.groups[h.gaussian as usize] as u8;
+        Ok(Picture {
+            rgb: render.rgb,
+            alpha: render.alpha,
+            depth: hits.iter().map(|h| h.map_or(0.0, |h| h.depth)).collect(),
+            parts: hits.iter().map(|h| h.map_or(BACKGROUND, part)).collect(),
+        })
     }
 
     /// Labels of a recorded view for fusing: background where the mask says so, the rendered part where measured and

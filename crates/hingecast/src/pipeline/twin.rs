@@ -17,7 +17,7 @@ pub fn run(context: &Context, run: &Path) -> Result<Vec<String>> {
 
     // Labels of all frames first: the engine uses all threads for one picture.
     let progress = context.ui.stage("label");
-    let mut labeller = Labeller::new(&gaussians, &found.labels, found.tree.parts.len(), context.threads)?;
+    let mut labeller = Labeller::new(&gaussians, &found.labels, context.threads)?;
     let tolerance = (0.02 * extent.diagonal) as f32;
     let mut labels = Vec::with_capacity(frames.len());
     let mut state = usize::MAX;

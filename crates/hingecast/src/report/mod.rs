@@ -44,7 +44,7 @@ pub fn write(run: &RunFolder) -> Result<PathBuf> {
     let found = joints::load(&run.root)?;
     let cache = ViewCache::new(&recording, 64 << 20);
     let background = splat::background(&recording, &cache)?.0;
-    let mut labeller = Labeller::new(&gaussians, &found.labels, found.tree.parts.len(), run.record.threads.max(1))?;
+    let mut labeller = Labeller::new(&gaussians, &found.labels, run.record.threads.max(1))?;
     let centres = part_centres(&gaussians.means, &found.labels, found.tree.parts.len());
 
     // First, middle and last state from three sides that are far from each other.
