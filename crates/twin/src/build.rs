@@ -1,7 +1,7 @@
 //! The stage: observations and tree in, [`Twin`] out.
 
 use crate::fuse::{self, Field};
-use crate::{Inertial, Observation, PartModel, Twin, clearance, color, hulls, mass, simplify, surface};
+use crate::{Inertial, Observation, PartModel, Twin, clearance, color, hulls, mass, separate, simplify, surface};
 use glam::{DMat3, DVec3, Vec3};
 use hingecast_geom::{Cancelled, KinematicTree, Pose, Progress, TriMesh};
 use rayon::prelude::*;
@@ -116,8 +116,14 @@ pub fn build<E: From<Cancelled> + Send>(
     let hull_config = hulls::HullConfig { max_hulls: config.max_hulls, ..Default::default() };
     let decomposed: Vec<(Vec<TriMesh>, usize)> =
         collision.par_iter().map(|mesh| hulls::decompose(mesh, &hull_config)).collect();
+    let (mut pieces, flat): (Vec<Vec<TriMesh>>, Vec<usize>) = decomposed.into_iter().unzip();
+    let root_first: Vec<usize> = order.iter().rev().copied().collect();
+    let lost = separate::separate(&mut pieces, &root_first, &poses, 0.25 * voxel);
+    if lost > 0 {
+        doubts.push(format!("{lost} collision pieces lay inside other parts and were dropped"));
+    }
     let mut parts = Vec::new();
-    for (part, (mesh, (hulls, dropped))) in meshes.into_iter().zip(decomposed).enumerate() {
+    for (part, (mesh, (hulls, dropped))) in meshes.into_iter().zip(pieces.into_iter().zip(flat)).enumerate() {
         let name = &tree.parts[part];
         if mesh.is_empty() {
             doubts.push(format!("part '{name}' has no surface: no depth pixel carries its label"));

@@ -16,6 +16,7 @@ pub mod hulls;
 pub mod mass;
 pub mod mjcf;
 pub mod relabel;
+pub mod separate;
 pub mod simplify;
 pub mod surface;
 pub mod urdf;

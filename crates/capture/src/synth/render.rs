@@ -13,11 +13,14 @@ pub(crate) struct Picture {
     pub part: Vec<u8>,
 }
 
-/// Colour samples per pixel side, everywhere and where they differ (edges, print).
+/// Colour samples per pixel side: everywhere, and in pixels that hold an edge. Print needs no finer samples, its texture
+/// is filtered already.
 const COARSE: usize = 2;
 const FINE: usize = 4;
-/// Linear-light difference between a pixel's samples above which it is sampled finely: about 6 steps of 255.
-const DIFFERS: f32 = 0.02;
+/// Two hits belong to one smooth surface when their normals are closer than this cosine (14 degrees) and their depths
+/// within this share.
+const SMOOTH_COS: f32 = 0.97;
+const SMOOTH_DEPTH: f32 = 0.02;
 
 /// Origin and direction (camera z 1) of the ray through the centre of pixel (x, y).
 pub(crate) fn centre_ray(camera: &Camera, x: usize, y: usize) -> (Vec3A, Vec3A) {
@@ -41,23 +44,24 @@ pub(crate) fn render(scene: &Scene, looks: &Looks, poses: &[Pose], camera: &Came
         let direction = base + dx * x + dy * y;
         (scene.cast(origin, direction, f32::INFINITY), direction)
     };
-    let color = |x: f32, y: f32, side: usize| -> Vec3 {
-        match cast(x, y) {
-            (Some(hit), direction) => {
-                let footprint = hit.t * pixel_angle / side as f32;
-                looks.shade(&hit, direction, footprint, turns[hit.part])
-            }
-            (None, _) => background,
-        }
-    };
-    let mean = |x: usize, y: usize, side: usize| -> (Vec3, f32) {
-        let (mut sum, mut lo, mut hi) = (Vec3::ZERO, Vec3::INFINITY, Vec3::NEG_INFINITY);
+    // Colour of a pixel's side x side samples, and whether they see different surfaces.
+    let mean = |x: usize, y: usize, side: usize| -> (Vec3, bool) {
+        let (mut sum, mut edge) = (Vec3::ZERO, false);
+        let mut first: Option<Option<Hit>> = None;
         for i in 0..side * side {
             let offset = |k: usize| (k as f32 + 0.5) / side as f32;
-            let c = color(x as f32 + offset(i % side), y as f32 + offset(i / side), side);
-            (sum, lo, hi) = (sum + c, lo.min(c), hi.max(c));
+            let (hit, direction) = cast(x as f32 + offset(i % side), y as f32 + offset(i / side));
+            sum += match &hit {
+                Some(hit) => looks.shade(hit, direction, hit.t * pixel_angle / side as f32, turns[hit.part]),
+                None => background,
+            };
+            edge |= match (first.get_or_insert(hit), &hit) {
+                (Some(a), Some(b)) => !looks.alike(a, b) || !smooth(a, b),
+                (None, None) => false,
+                _ => true,
+            };
         }
-        (sum / (side * side) as f32, (hi - lo).max_element())
+        (sum / (side * side) as f32, edge)
     };
 
     let mut out = Picture { rgb: vec![0; 3 * w * h], depth: vec![0.0; w * h], part: vec![0; w * h] };
@@ -68,8 +72,8 @@ pub(crate) fn render(scene: &Scene, looks: &Looks, poses: &[Pose], camera: &Came
                 out.depth[i] = hit.t;
                 out.part[i] = hit.part as u8 + 1;
             }
-            let (mut c, spread) = mean(x, y, COARSE);
-            if spread > DIFFERS {
+            let (mut c, edge) = mean(x, y, COARSE);
+            if edge {
                 (c, _) = mean(x, y, FINE);
             }
             for k in 0..3 {
@@ -78,4 +82,8 @@ pub(crate) fn render(scene: &Scene, looks: &Looks, poses: &[Pose], camera: &Came
         }
     }
     out
+}
+
+fn smooth(a: &Hit, b: &Hit) -> bool {
+    a.normal.dot(b.normal).abs() > SMOOTH_COS && (a.t - b.t).abs() < SMOOTH_DEPTH * a.t
 }

@@ -52,6 +52,12 @@ impl<'a> Looks<'a> {
         Self { object, parts, materials, colors, density }
     }
 
+    /// Same part, same material.
+    pub fn alike(&self, a: &Hit, b: &Hit) -> bool {
+        let material = |h: &Hit| self.parts[h.part].materials[h.face];
+        a.part == b.part && material(a) == material(b)
+    }
+
     /// Linear-light colour of a hit. `footprint` is the side of the sample's patch at the hit, scene units;
     /// `turn` rotates canonical normals into the world.
     pub fn shade(&self, hit: &Hit, direction: Vec3A, footprint: f32, turn: glam::Quat) -> Vec3 {
