@@ -28,11 +28,18 @@ impl Default for PhysicsWeights {
     }
 }
 
-/// The fixed graph of neighbours from the first state.
+/// What a gaussian's neighbours need to know of it, in half a cache line: position, padding, what turned it
+/// since the previous state (u = q q_p^-1).
+type Node = [f32; 8];
+
+/// Gradient that an edge i -> j exerts on j (and, negated, on i): by the position, padding, by u.
+type Edge = [f32; 8];
+
+/// The fixed graph of neighbours from the first state, and the state before the one that is being fitted.
 pub struct Neighbourhood {
     /// (n, K) indices.
     index: Vec<u32>,
-    /// (n, K) weights.
+    /// (n, K) weights / number of edges.
     weight: Vec<f32>,
     /// (n, K) distances in the first state.
     rest: Vec<f32>,
@@ -40,7 +47,11 @@ pub struct Neighbourhood {
     start: Vec<u32>,
     reverse: Vec<u32>,
     inv_diagonal: f32,
-    edges: Vec<[f32; 7]>,
+    /// Unit quaternions of the previous state. (n)
+    previous_quats: Vec<[f32; 4]>,
+    /// R_i,p^-1 (x_j - x_i)_p per edge, components apart. (n) x [x, y, z][K]
+    previous_offsets: Vec<[[f32; K]; 3]>,
+    edges: Vec<Edge>,
 }
 
 impl Neighbourhood {
@@ -60,7 +71,8 @@ impl Neighbourhood {
             }
         }
         let h = rest.iter().sum::<f32>() / rest.len().max(1) as f32;
-        let weight = rest.iter().map(|d| (-d * d / (2.0 * h * h).max(1e-20)).exp()).collect();
+        let per_edge = 1.0 / index.len().max(1) as f32;
+        let weight = rest.iter().map(|d| per_edge * (-d * d / (2.0 * h * h).max(1e-20)).exp()).collect();
         let mut start = vec![0u32; n + 1];
         index.iter().for_each(|&j| start[j as usize + 1] += 1);
         (0..n).for_each(|i| start[i + 1] += start[i]);
@@ -70,104 +82,179 @@ impl Neighbourhood {
             reverse[fill[j as usize] as usize] = e as u32;
             fill[j as usize] += 1;
         }
-        let edges = vec![[0.0; 7]; index.len()];
-        Self { index, weight, rest, start, reverse, inv_diagonal: 1.0 / diagonal as f32, edges }
+        let edges = vec![[0.0; 8]; index.len()];
+        let inv_diagonal = 1.0 / diagonal as f32;
+        let (previous_quats, previous_offsets) = (Vec::new(), Vec::new());
+        Self { index, weight, rest, start, reverse, inv_diagonal, previous_quats, previous_offsets, edges }
+    }
+
+    /// Sets the state before the one to be fitted: positions and quaternions (wxyz, any length > 0).
+    pub fn set_previous(&mut self, means: &[[f32; 3]], quats: &[[f32; 4]]) {
+        self.previous_quats = quats.iter().map(|q| unit(*q)).collect();
+        let (index, quats) = (&self.index, &self.previous_quats);
+        self.previous_offsets = (0..means.len())
+            .into_par_iter()
+            .map(|i| {
+                let r = matrix(quats[i]);
+                let mut out = [[0.0; K]; 3];
+                for k in 0..K {
+                    let back = transpose_times(&r, sub(means[index[i * K + k] as usize], means[i]));
+                    (0..3).for_each(|a| out[a][k] = back[a]);
+                }
+                out
+            })
+            .collect();
     }
 
     /// Adds the gradients of the three losses at `means`, `quats` (wxyz, any length > 0) to `grad_means`,
-    /// `grad_quats`, given the previous state. Answers the loss. The same bytes on any number of threads.
+    /// `grad_quats`. Answers the loss. The same bytes on any number of threads.
+    ///
+    /// # Panics
+    /// When no previous state of the same size was set.
     pub fn add_gradients(
         &mut self,
         means: &[[f32; 3]],
         quats: &[[f32; 4]],
-        previous_means: &[[f32; 3]],
-        previous_quats: &[[f32; 4]],
         weights: &PhysicsWeights,
         grad_means: &mut [[f32; 3]],
         grad_quats: &mut [[f32; 4]],
     ) -> f64 {
-        let per_edge = 1.0 / self.index.len().max(1) as f32;
-        let (index, weight, rest, inv_diagonal) = (&self.index, &self.weight, &self.rest, self.inv_diagonal);
-        // What turned each gaussian since the previous state: u = q q_p^-1, and q's own rotation.
-        let turned: Vec<([f32; 4], [f32; 4])> = quats
-            .par_iter()
-            .zip(previous_quats)
-            .map(|(q, p)| {
-                let q = unit(*q);
-                (q, multiply(q, conjugate(unit(*p))))
+        assert_eq!(self.previous_quats.len(), means.len(), "set_previous first");
+        let previous_quats = &self.previous_quats;
+        let nodes: Vec<Node> = (0..means.len())
+            .into_par_iter()
+            .with_min_len(1024)
+            .map(|i| {
+                let ([x, y, z], u) = (means[i], multiply(unit(quats[i]), conjugate(previous_quats[i])));
+                [x, y, z, 0.0, u[0], u[1], u[2], u[3]]
             })
             .collect();
 
         // First pass, by source gaussian: per-edge gradients, and the rigid loss's gradient of the own rotation.
-        let own: Vec<(f64, [f32; 4])> = self
+        let scales = [weights.rigid * self.inv_diagonal, weights.isometry * self.inv_diagonal, weights.rotation];
+        let (index, weight, rest, offsets) = (&self.index, &self.weight, &self.rest, &self.previous_offsets);
+        let own: Vec<(f32, [f32; 4])> = self
             .edges
             .par_chunks_mut(K)
+            .with_min_len(256)
             .enumerate()
             .map(|(i, edges)| {
-                let (q, u_i) = turned[i];
-                let r = matrix(q);
-                let r_previous = matrix(unit(previous_quats[i]));
-                let mut loss = 0.0f64;
-                let mut grad_r = [[0.0f32; 3]; 3];
-                for (k, edge) in edges.iter_mut().enumerate() {
-                    let e = i * K + k;
-                    let (j, w) = (index[e] as usize, weight[e] * per_edge);
-                    let d = sub(means[j], means[i]);
-                    let before = sub(previous_means[j], previous_means[i]);
-                    // rigid, seen from the gaussian's own frame: R_p' before - R' d
-                    let back = sub(transpose_times(&r_previous, before), transpose_times(&r, d));
-                    let size = length(back).max(1e-12);
-                    let scale = weights.rigid * w * inv_diagonal;
-                    loss += (scale * size) as f64;
-                    let g = back.map(|x| -x / size * scale);
-                    let mut grad_d = times(&r, g);
-                    for a in 0..3 {
-                        for b in 0..3 {
-                            grad_r[a][b] += d[a] * g[b];
-                        }
-                    }
-                    // isometry
-                    let now = length(d).max(1e-12);
-                    let stretch = now - rest[e];
-                    let scale = weights.isometry * w * inv_diagonal;
-                    loss += (scale * stretch.abs()) as f64;
-                    let s = scale * stretch.signum() / now;
-                    (0..3).for_each(|a| grad_d[a] += s * d[a]);
-                    // rotation
-                    let u_j = turned[j].1;
-                    let du: [f32; 4] = std::array::from_fn(|a| u_j[a] - u_i[a]);
-                    let size = du.iter().map(|x| x * x).sum::<f32>().sqrt().max(1e-12);
-                    let scale = weights.rotation * w;
-                    loss += (scale * size) as f64;
-                    let gu = du.map(|x| x / size * scale);
-                    *edge = [grad_d[0], grad_d[1], grad_d[2], gu[0], gu[1], gu[2], gu[3]];
-                }
-                (loss, matrix_gradient(q, &grad_r))
+                let span = i * K..(i + 1) * K;
+                let source = Source {
+                    node: &nodes[i],
+                    quat: unit(quats[i]),
+                    index: &index[span.clone()],
+                    weight: &weight[span.clone()],
+                    rest: &rest[span],
+                    offsets: &offsets[i],
+                };
+                pull(&source, &nodes, &scales, edges)
             })
             .collect();
 
         // Second pass, by receiving gaussian: its own edges pull with -g, the edges that end in it with +g.
         let (edges, start, reverse) = (&self.edges, &self.start, &self.reverse);
-        grad_means.par_iter_mut().zip(grad_quats.par_iter_mut()).enumerate().for_each(|(i, (gm, gq))| {
-            let mut sum = [0.0f32; 7];
+        let receive = |(i, (gm, gq)): (usize, (&mut [f32; 3], &mut [f32; 4]))| {
+            let mut sum = [0.0f32; 8];
             for edge in &edges[i * K..(i + 1) * K] {
-                (0..7).for_each(|a| sum[a] -= edge[a]);
+                (0..8).for_each(|a| sum[a] -= edge[a]);
             }
             for &e in &reverse[start[i] as usize..start[i + 1] as usize] {
-                (0..7).for_each(|a| sum[a] += edges[e as usize][a]);
+                let edge = &edges[e as usize];
+                (0..8).for_each(|a| sum[a] += edge[a]);
             }
             (0..3).for_each(|a| gm[a] += sum[a]);
             // u = q p^-1: right multiplication by a unit quaternion is orthogonal, its transpose multiplies by p.
-            let from_u = multiply([sum[3], sum[4], sum[5], sum[6]], unit(previous_quats[i]));
+            let from_u = multiply([sum[4], sum[5], sum[6], sum[7]], previous_quats[i]);
             let total: [f32; 4] = std::array::from_fn(|a| from_u[a] + own[i].1[a]);
             // Through the normalisation q / |q|.
             let size = quats[i].iter().map(|x| x * x).sum::<f32>().sqrt().max(1e-12);
-            let q = turned[i].0;
+            let q = unit(quats[i]);
             let along: f32 = (0..4).map(|a| total[a] * q[a]).sum();
             (0..4).for_each(|a| gq[a] += (total[a] - along * q[a]) / size);
-        });
-        own.iter().map(|o| o.0).sum()
+        };
+        grad_means.par_iter_mut().zip(grad_quats.par_iter_mut()).enumerate().with_min_len(256).for_each(receive);
+        own.iter().map(|o| o.0 as f64).sum()
     }
+}
+
+/// One gaussian and its K edges.
+struct Source<'a> {
+    node: &'a Node,
+    quat: [f32; 4],
+    index: &'a [u32],
+    weight: &'a [f32],
+    rest: &'a [f32],
+    offsets: &'a [[f32; K]; 3],
+}
+
+/// The first pass for one gaussian: writes its edges' gradients, answers the loss and dL/dq by its own rotation.
+/// `scales`: rigid, isometry, rotation. The widest vectors that the CPU has; the bits are the same with any.
+fn pull(source: &Source, nodes: &[Node], scales: &[f32; 3], edges: &mut [Edge]) -> (f32, [f32; 4]) {
+    #[cfg(target_arch = "x86_64")]
+    {
+        #[target_feature(enable = "avx2")]
+        fn wide(source: &Source, nodes: &[Node], scales: &[f32; 3], edges: &mut [Edge]) -> (f32, [f32; 4]) {
+            pull_lanes(source, nodes, scales, edges)
+        }
+        if std::arch::is_x86_feature_detected!("avx2") {
+            // SAFETY: the feature was just found.
+            return unsafe { wide(source, nodes, scales, edges) };
+        }
+    }
+    pull_lanes(source, nodes, scales, edges)
+}
+
+/// Neighbours in lanes: every loop over `k` is one formula for all K edges, which the compiler turns into vectors.
+#[inline(always)]
+fn pull_lanes(source: &Source, nodes: &[Node], scales: &[f32; 3], edges: &mut [Edge]) -> (f32, [f32; 4]) {
+    let (mut d, mut du) = ([[0.0f32; K]; 3], [[0.0f32; K]; 4]);
+    for k in 0..K {
+        let other = &nodes[source.index[k] as usize];
+        (0..3).for_each(|a| d[a][k] = other[a] - source.node[a]);
+        (0..4).for_each(|a| du[a][k] = other[4 + a] - source.node[4 + a]);
+    }
+    let r = matrix(source.quat);
+    let (weight, rest): (&[f32; K], &[f32; K]) =
+        (source.weight.try_into().expect("K weights"), source.rest.try_into().expect("K distances"));
+    let (mut g, mut pull_d) = ([[0.0f32; K]; 3], [[0.0f32; K]; 3]);
+    let mut loss = [0.0f32; K];
+    for k in 0..K {
+        // rigid, seen from the gaussian's own frame: R_p' before - R' d
+        let back: [f32; 3] =
+            [0, 1, 2].map(|a| source.offsets[a][k] - (r[0][a] * d[0][k] + r[1][a] * d[1][k] + r[2][a] * d[2][k]));
+        let size = (back[0] * back[0] + back[1] * back[1] + back[2] * back[2]).sqrt().max(1e-12);
+        let scale = scales[0] * weight[k];
+        let along = -scale / size;
+        g[0][k] = back[0] * along;
+        g[1][k] = back[1] * along;
+        g[2][k] = back[2] * along;
+        // isometry
+        let now = (d[0][k] * d[0][k] + d[1][k] * d[1][k] + d[2][k] * d[2][k]).sqrt().max(1e-12);
+        let stretch = now - rest[k];
+        let iso = scales[1] * weight[k];
+        let s = iso.copysign(stretch) / now;
+        for a in 0..3 {
+            pull_d[a][k] = r[a][0] * g[0][k] + r[a][1] * g[1][k] + r[a][2] * g[2][k] + s * d[a][k];
+        }
+        // rotation
+        let turn =
+            (du[0][k] * du[0][k] + du[1][k] * du[1][k] + du[2][k] * du[2][k] + du[3][k] * du[3][k]).sqrt().max(1e-12);
+        let rotation = scales[2] * weight[k];
+        let along = rotation / turn;
+        (0..4).for_each(|a| du[a][k] *= along);
+        loss[k] = scale * size + iso * stretch.abs() + rotation * turn;
+    }
+    let mut grad_r = [[0.0f32; 3]; 3];
+    for a in 0..3 {
+        for b in 0..3 {
+            grad_r[a][b] = (0..K).map(|k| d[a][k] * g[b][k]).sum();
+        }
+    }
+    for (k, edge) in edges.iter_mut().enumerate() {
+        *edge = [pull_d[0][k], pull_d[1][k], pull_d[2][k], 0.0, du[0][k], du[1][k], du[2][k], du[3][k]];
+    }
+    (loss.iter().sum(), matrix_gradient(source.quat, &grad_r))
 }
 
 fn sub(a: [f32; 3], b: [f32; 3]) -> [f32; 3] {
@@ -205,6 +292,7 @@ fn matrix([w, x, y, z]: [f32; 4]) -> [[f32; 3]; 3] {
     ]
 }
 
+#[cfg(test)]
 fn times(m: &[[f32; 3]; 3], v: [f32; 3]) -> [f32; 3] {
     std::array::from_fn(|a| m[a][0] * v[0] + m[a][1] * v[1] + m[a][2] * v[2])
 }
@@ -255,7 +343,8 @@ mod tests {
         let (mut gm, mut gq) = (vec![[0.0; 3]; s.means.len()], vec![[0.0; 4]; s.means.len()]);
         let weights = PhysicsWeights::default();
         let (m, q, b) = (s.means.clone(), s.quats.clone(), s.before.clone());
-        let loss = s.hood.add_gradients(&m, &q, &b.0, &b.1, &weights, &mut gm, &mut gq);
+        s.hood.set_previous(&b.0, &b.1);
+        let loss = s.hood.add_gradients(&m, &q, &weights, &mut gm, &mut gq);
         (loss, gm, gq)
     }
 

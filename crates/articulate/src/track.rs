@@ -95,6 +95,7 @@ pub fn run<E: From<SplatError> + From<Cancelled>>(
         };
         let (previous, earlier) = (before(1), before(2));
         start_by_velocity(&mut engine, &previous, &earlier);
+        hood.set_previous(&previous.means, &previous.quats);
         let views = targets(state)?;
         // A generator per state: a resumed run draws the same views as an uninterrupted one.
         let mut rng = fastrand::Rng::with_seed(seed ^ (state as u64) << 20);
@@ -107,7 +108,7 @@ pub fn run<E: From<SplatError> + From<Cancelled>>(
             }
             let Some(view) = order.pop() else { break };
             let terms = engine.loss_and_gradients(&views[view], &loss, &mut gradients)?;
-            add_physics(&engine, &mut hood, &previous, &config.physics, &mut gradients);
+            add_physics(&engine, &mut hood, &config.physics, &mut gradients);
             let t = step as f32 / config.steps as f32;
             let decay = (config.rate[1] / config.rate[0]).powf(t);
             let rates = Rates {
@@ -154,19 +155,13 @@ fn start_by_velocity(engine: &mut Engine, previous: &Past, earlier: &Past) {
     engine.reset_moments();
 }
 
-fn add_physics(
-    engine: &Engine,
-    hood: &mut Neighbourhood,
-    previous: &Past,
-    weights: &PhysicsWeights,
-    gradients: &mut Gradients,
-) {
+fn add_physics(engine: &Engine, hood: &mut Neighbourhood, weights: &PhysicsWeights, gradients: &mut Gradients) {
     let params = engine.params();
     let n = params.len();
     let means: Vec<[f32; 3]> = (0..n).map(|i| params.get(plane::MEANS, i)).collect();
     let quats: Vec<[f32; 4]> = (0..n).map(|i| params.get(plane::QUATS, i)).collect();
     let (mut gm, mut gq) = (vec![[0.0f32; 3]; n], vec![[0.0f32; 4]; n]);
-    hood.add_gradients(&means, &quats, &previous.means, &previous.quats, weights, &mut gm, &mut gq);
+    hood.add_gradients(&means, &quats, weights, &mut gm, &mut gq);
     for a in 0..3 {
         gradients.params.plane_mut(plane::MEANS + a).iter_mut().zip(&gm).for_each(|(g, x)| *g += x[a]);
     }
