@@ -16,8 +16,13 @@ work=$(mktemp -d)
 trap 'rm -rf "$work"' EXIT
 echo "fetching MuJoCo $version from PyPI"
 # The wheel of any CPython holds the same library; name one so that the host's Python version does not matter.
-python3 -m pip download --quiet --no-deps --only-binary=:all: --python-version 3.11 --implementation cp \
-  --dest "$work" "mujoco==$version"
+if ! python3 -m pip download --quiet --disable-pip-version-check --no-deps --only-binary=:all: --python-version 3.11 \
+  --implementation cp --dest "$work" "mujoco==$version"; then
+  echo "error: pip could not download mujoco==$version" >&2
+  echo "  where: scripts/fetch_mujoco.sh; pip's own words are above" >&2
+  echo "  try: check the network and pip's settings, or put libmujoco.so.$version into $target/lib yourself" >&2
+  exit 2
+fi
 python3 - "$work" <<'PY'
 import glob, sys, zipfile
 zipfile.ZipFile(glob.glob(sys.argv[1] + "/mujoco-*.whl")[0]).extractall(sys.argv[1])
@@ -25,6 +30,6 @@ PY
 mkdir -p "$target/lib.new"
 cp "$work/mujoco/libmujoco.so.$version" "$target/lib.new/"
 ln -sf "libmujoco.so.$version" "$target/lib.new/libmujoco.so"
+rm -rf "$target/include" "$target/lib"
 cp -r "$work/mujoco/include" "$target/include"
-rm -rf "$target/lib"
 mv "$target/lib.new" "$target/lib"

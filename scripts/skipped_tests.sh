@@ -5,6 +5,6 @@ awk '
   /^---- .* stdout ----$/ { test = $2 }
   /^skipped: / { reason = substr($0, 10); count++; list = list "  " test ": " reason "\n" }
   END {
-    if (count) printf "%d tests skipped:\n%s", count, list
+    if (count) printf "tests skipped: %d\n%s", count, list
     else print "no test skipped"
   }' "$1"

@@ -131,6 +131,10 @@ pub fn run<E: From<SplatError> + From<Cancelled>>(
         save(state, &now.means, &now.quats)?;
         tracks.means.push(now.means);
         tracks.quats.push(now.quats);
+        // Only means and quaternions are saved: the colours of every state start from the first one's, or a resumed
+        // run would take other steps than an uninterrupted one.
+        let params = engine.params_mut();
+        first.sh0.iter().enumerate().for_each(|(i, color)| params.set(plane::SH0, i, *color));
     }
     Ok(tracks)
 }

@@ -27,6 +27,7 @@ fn every_help_text_says_defaults_and_units() {
     }
     let says = |verb: &str, words: &[&str]| {
         let text = hingecast(dir.path(), &format!("{verb} --help")).stdout;
+        let text = text.split_whitespace().collect::<Vec<_>>().join(" ");
         words.iter().for_each(|w| assert!(text.contains(w), "{verb} --help does not say '{w}'"));
     };
     says("synth", &["pixels", "radians", "scene units", "deg", "mm"]);

@@ -4,7 +4,7 @@ mod common;
 
 use common::{assert_finite, hingecast};
 
-/// The trash can at a quarter of the default pictures and a fraction of the steps: the lid's hinge is found all the same.
+/// The trash can with a fraction of the default pictures, pixels and steps: the lid's hinge is found all the same.
 #[test]
 fn the_trash_can_has_its_hinge() {
     if std::env::var_os("HINGECAST_DATA").is_none() {
@@ -13,8 +13,8 @@ fn the_trash_can_has_its_hinge() {
     }
     let dir = tempfile::tempdir().unwrap();
     let dir = dir.path();
-    hingecast(dir, "synth trashcan_102209 -o rec --states 9 --views 24 --test-views 2 --size 128 -q").done();
-    let settings = "--set fit.steps=500 --set fit.gaussians=5000 --set track.steps=120 --set twin.voxel=0.01";
+    hingecast(dir, "synth trashcan_102209 -o rec --states 13 --views 24 --test-views 2 --size 128 -q").done();
+    let settings = "--set fit.steps=500 --set fit.gaussians=5000 --set track.steps=240 --set twin.voxel=0.01";
     let built = hingecast(dir, &format!("build rec -o run {settings}")).done();
     let answer = hingecast(dir, "eval run --truth rec.truth --json").done();
     let figures = answer.json();

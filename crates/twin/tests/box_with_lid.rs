@@ -63,13 +63,13 @@ fn observe(state: usize, view: usize) -> Observation {
         for (part, boxes) in parts.iter().enumerate() {
             let back = poses[part].inverse();
             for &(lo, hi) in boxes {
-                if let Some(z) = ray_box(back.apply(eye), back.rotate(d), lo, hi) {
-                    if seen.labels[i] == BACKGROUND || (z as f32) < seen.depth[i] {
-                        seen.depth[i] = z as f32;
-                        seen.labels[i] = part as u8;
-                        seen.rgb[3 * i + part] = 200;
-                        seen.rgb[3 * i + 1 - part] = 0;
-                    }
+                if let Some(z) = ray_box(back.apply(eye), back.rotate(d), lo, hi)
+                    && (seen.labels[i] == BACKGROUND || (z as f32) < seen.depth[i])
+                {
+                    seen.depth[i] = z as f32;
+                    seen.labels[i] = part as u8;
+                    seen.rgb[3 * i + part] = 200;
+                    seen.rgb[3 * i + 1 - part] = 0;
                 }
             }
         }
