@@ -75,7 +75,9 @@ impl Config {
         match preset {
             Preset::Fast => {
                 c.fit = Fit { gaussians: 12_000, steps: 1500 };
-                c.track.steps = c.track.steps.div_ceil(2);
+                // Fewer steps must be longer ones, or wide moves between states are lost.
+                c.track.steps = 240;
+                c.track.rate[0] = 1.6e-3;
                 c.twin.voxel = 1.0 / 160.0;
             }
             Preset::Default => {}

@@ -99,7 +99,8 @@ pub fn build<E: From<Cancelled> + Send>(
     };
     let mut meshes: Vec<TriMesh> =
         fields.par_iter().map(|f| f.as_ref().map_or_else(TriMesh::default, mesh_of)).collect();
-    // Root first, then along the tree: every part keeps clear of those before it.
+    // Root first, then along the tree: every part keeps clear of those before it, also between recorded states.
+    let path: Vec<Vec<Pose>> = poses.iter().cloned().chain(sweeps(tree)).collect();
     let collision: Vec<TriMesh> = (0..fields.len())
         .into_par_iter()
         .map(|part| {
@@ -107,7 +108,7 @@ pub fn build<E: From<Cancelled> + Send>(
             if before.is_empty() {
                 return meshes[part].clone();
             }
-            clearance::trim(part, &fields, &before, &poses).map_or_else(TriMesh::default, |f| mesh_of(&f))
+            clearance::trim(part, &fields, &before, &path).map_or_else(TriMesh::default, |f| mesh_of(&f))
         })
         .collect();
     drop(fields);
@@ -118,7 +119,7 @@ pub fn build<E: From<Cancelled> + Send>(
         collision.par_iter().map(|mesh| hulls::decompose(mesh, &hull_config)).collect();
     let (mut pieces, flat): (Vec<Vec<TriMesh>>, Vec<usize>) = decomposed.into_iter().unzip();
     let root_first: Vec<usize> = order.iter().rev().copied().collect();
-    let lost = separate::separate(&mut pieces, &root_first, &poses, 0.25 * voxel);
+    let lost = separate::separate(&mut pieces, &root_first, &path, 0.1 * voxel);
     if lost > 0 {
         doubts.push(format!("{lost} collision pieces lay inside other parts and were dropped"));
     }
@@ -154,6 +155,23 @@ pub fn build<E: From<Cancelled> + Send>(
         metric: input.metric,
         up: input.up,
     })
+}
+
+/// Each joint in turn over its range in small steps, the others as in the first state. [pose][part]
+fn sweeps(tree: &KinematicTree) -> Vec<Vec<Pose>> {
+    const STEPS: usize = 40;
+    let Some(first) = tree.joints.iter().map(|j| j.values.first().copied()).collect::<Option<Vec<f64>>>() else {
+        return Vec::new();
+    };
+    let mut out = Vec::new();
+    for (j, joint) in tree.joints.iter().enumerate() {
+        for k in 0..=STEPS {
+            let mut q = first.clone();
+            q[j] = joint.limits[0] + (joint.limits[1] - joint.limits[0]) * k as f64 / STEPS as f64;
+            out.push(tree.poses(&q));
+        }
+    }
+    out
 }
 
 /// Joints between `part` and its root.

@@ -86,7 +86,8 @@ impl PartVolume {
         let (w, size, reach) = (seen.camera.width, self.block_size(), self.truncation);
         for (i, &label) in seen.labels.iter().enumerate() {
             let depth = seen.depth[i];
-            if label != part || !(depth > 0.0) {
+            // Every other pixel, as on a chessboard: blocks are many pixels wide.
+            if label != part || !(depth > 0.0) || (i % w + i / w) % 2 == 1 {
                 continue;
             }
             let (u, v) = ((i % w) as f64 + 0.5, (i / w) as f64 + 0.5);

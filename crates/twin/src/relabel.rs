@@ -5,13 +5,40 @@
 //! through it, it cannot belong to that part; where a surface is measured at it, it may.
 
 use crate::{BACKGROUND, Observation, UNKNOWN};
-use glam::DVec3;
+use glam::{DVec3, Mat3, Vec3};
 use hingecast_geom::Pose;
 use rayon::prelude::*;
 use std::collections::BTreeMap;
 
-/// Views of a state that are asked; more say little that is new.
-const VIEWS_PER_STATE: usize = 16;
+/// Views of a state that are asked, and states; more say little that is new.
+const VIEWS_PER_STATE: usize = 12;
+const STATES: usize = 12;
+
+/// A camera of another state, ready to project many points. World frame.
+struct Witness<'a> {
+    rot: Mat3,
+    trans: Vec3,
+    f: [f32; 4],
+    width: usize,
+    height: usize,
+    depth: &'a [f32],
+    labels: &'a [u8],
+}
+
+impl<'a> Witness<'a> {
+    fn new(seen: &'a Observation, labels: &'a [u8]) -> Self {
+        let c = &seen.camera;
+        Self {
+            rot: c.camera_from_world.mat3().as_mat3(),
+            trans: c.camera_from_world.trans.as_vec3(),
+            f: [c.fx as f32, c.fy as f32, c.cx as f32, c.cy as f32],
+            width: c.width,
+            height: c.height,
+            depth: &seen.depth,
+            labels,
+        }
+    }
+}
 
 /// What the other states say about one point under one part's motion.
 #[derive(Clone, Copy, Default)]
@@ -43,28 +70,32 @@ pub fn resolve<E: Send>(
             slot.1 += 1.0;
         });
     }
-    let mut witnesses: Vec<Vec<(&Observation, &Vec<u8>)>> = vec![Vec::new(); poses.len()];
-    for (seen, labels) in observations.iter().zip(labels.iter()) {
-        witnesses[seen.state].push((seen, labels));
-    }
-    for list in &mut witnesses {
-        let step = list.len().div_ceil(VIEWS_PER_STATE).max(1);
-        *list = list.iter().step_by(step).copied().collect();
-    }
+    let mut by_state: Vec<Vec<usize>> = vec![Vec::new(); poses.len()];
+    observations.iter().enumerate().for_each(|(i, seen)| by_state[seen.state].push(i));
+    let asked_states: Vec<usize> = (0..poses.len()).step_by(poses.len().div_ceil(STATES).max(1)).collect();
+    let asked: Vec<(usize, Vec<Witness>)> = asked_states
+        .iter()
+        .map(|&state| {
+            let step = by_state[state].len().div_ceil(VIEWS_PER_STATE).max(1);
+            let views = by_state[state].iter().step_by(step);
+            (state, views.map(|&i| Witness::new(&observations[i], &labels[i])).collect())
+        })
+        .collect();
     let verdicts: Vec<BTreeMap<[i32; 3], u8>> = cells
         .par_iter()
         .enumerate()
         .map(|(state, cells)| {
+            // The asked states' poses of each part, relative to this state.
+            let there_from_here: Vec<Vec<Pose>> = (0..n_parts)
+                .map(|p| asked.iter().map(|(s, _)| poses[*s][p] * poses[state][p].inverse()).collect())
+                .collect();
             let judge = |x: DVec3| {
                 let verdict = |part: usize| {
-                    let canonical = poses[state][part].inverse().apply(x);
-                    (0..poses.len())
-                        .filter(|s| *s != state)
-                        .map(|s| ask(poses[s][part].apply(canonical), &witnesses[s], cell))
-                        .fold(Verdict::default(), |a, b| Verdict {
-                            against: a.against + b.against,
-                            support: a.support + b.support,
-                        })
+                    let others = asked.iter().zip(&there_from_here[part]).filter(|((s, _), _)| *s != state);
+                    others.map(|((_, views), pose)| ask(pose.apply(x).as_vec3(), views, cell as f32)).fold(
+                        Verdict::default(),
+                        |a, b| Verdict { against: a.against + b.against, support: a.support + b.support },
+                    )
                 };
                 let all: Vec<Verdict> = (0..n_parts).map(verdict).collect();
                 (0..n_parts).min_by_key(|p| (all[*p].against, u32::MAX - all[*p].support, *p)).unwrap_or(0) as u8
@@ -72,7 +103,7 @@ pub fn resolve<E: Send>(
             cells.iter().map(|(k, (sum, n))| (*k, judge(*sum / *n))).collect()
         })
         .collect();
-    drop(witnesses);
+    drop(asked);
     labels.par_iter_mut().zip(&observations).for_each(|(labels, seen)| {
         let mut found = Vec::new();
         for_unknown(seen, labels, &mut |i, x| {
@@ -106,19 +137,19 @@ fn for_unknown(seen: &Observation, labels: &[u8], emit: &mut dyn FnMut(usize, DV
 
 /// One state's answer about a world point: one vote against when a camera sees through it, else one vote for when a
 /// camera measures a surface there.
-fn ask(x: DVec3, witnesses: &[(&Observation, &Vec<u8>)], tolerance: f64) -> Verdict {
+fn ask(x: Vec3, witnesses: &[Witness], tolerance: f32) -> Verdict {
     let (mut through, mut hit) = (0, 0);
-    for (seen, labels) in witnesses {
-        let (uv, z) = seen.camera.project(x);
-        let (w, h) = (seen.camera.width, seen.camera.height);
-        if !(z > 0.0 && uv.x >= 0.0 && uv.y >= 0.0 && uv.x < w as f64 && uv.y < h as f64) {
+    for w in witnesses {
+        let x = w.rot * x + w.trans;
+        let (u, v) = (w.f[0] * x.x / x.z + w.f[2], w.f[1] * x.y / x.z + w.f[3]);
+        if !(x.z > 0.0 && u >= 0.0 && v >= 0.0 && u < w.width as f32 && v < w.height as f32) {
             continue;
         }
-        let i = uv.y as usize * w + uv.x as usize;
-        let depth = seen.depth[i] as f64;
-        if labels[i] == BACKGROUND || depth > z + 2.0 * tolerance {
+        let i = v as usize * w.width + u as usize;
+        let depth = w.depth[i];
+        if w.labels[i] == BACKGROUND || depth > x.z + 2.0 * tolerance {
             through += 1;
-        } else if depth > 0.0 && (depth - z).abs() < tolerance {
+        } else if depth > 0.0 && (depth - x.z).abs() < tolerance {
             hit += 1;
         }
     }

@@ -27,8 +27,9 @@ fn piece(hull: &TriMesh) -> Option<Piece> {
 }
 
 /// Cuts `hulls[part]` for all parts in `order` (root first) clear of the parts before it, in all states.
-/// `poses[state][part]`: world from canonical. Answers how many pieces were dropped.
-pub fn separate(hulls: &mut [Vec<TriMesh>], order: &[usize], poses: &[Vec<Pose>], tolerance: f32) -> usize {
+/// `poses[state][part]`: world from canonical; `clearance`: the gap to leave, scene units. Answers how many pieces were
+/// dropped.
+pub fn separate(hulls: &mut [Vec<TriMesh>], order: &[usize], poses: &[Vec<Pose>], clearance: f32) -> usize {
     let mut dropped = 0;
     for (k, &part) in order.iter().enumerate() {
         let mut cut = std::mem::take(&mut hulls[part]);
@@ -36,7 +37,7 @@ pub fn separate(hulls: &mut [Vec<TriMesh>], order: &[usize], poses: &[Vec<Pose>]
             let still: Vec<Piece> = hulls[other].iter().filter_map(piece).collect();
             let other_from_part: Vec<Pose> = poses.iter().map(|at| at[other].inverse() * at[part]).collect();
             let results: Vec<Option<TriMesh>> =
-                cut.par_iter().map(|hull| clear_of(hull, &still, &other_from_part, tolerance)).collect();
+                cut.par_iter().map(|hull| clear_of(hull, &still, &other_from_part, clearance)).collect();
             dropped += results.iter().filter(|r| r.is_none()).count();
             cut = results.into_iter().flatten().collect();
         }
@@ -46,7 +47,7 @@ pub fn separate(hulls: &mut [Vec<TriMesh>], order: &[usize], poses: &[Vec<Pose>]
 }
 
 /// `hull` cut clear of `still` under all motions; `None` when too little is left.
-fn clear_of(hull: &TriMesh, still: &[Piece], motions: &[Pose], tolerance: f32) -> Option<TriMesh> {
+fn clear_of(hull: &TriMesh, still: &[Piece], motions: &[Pose], clearance: f32) -> Option<TriMesh> {
     let whole = hull.mass_integrals().volume;
     let mut hull = hull.clone();
     let mut moving = piece(&hull)?;
@@ -58,14 +59,11 @@ fn clear_of(hull: &TriMesh, still: &[Piece], motions: &[Pose], tolerance: f32) -
             if lo.cmpgt(other.hi).any() || hi.cmplt(other.lo).any() {
                 continue;
             }
-            let found = query::contact(&ParryPose::IDENTITY, &other.shape, &place, &moving.shape, 0.0);
+            let found = query::contact(&ParryPose::IDENTITY, &other.shape, &place, &moving.shape, 0.5 * clearance);
             let Ok(Some(contact)) = found else { continue };
-            if contact.dist > -tolerance {
-                continue;
-            }
             // The supporting plane of the still piece, in the moving part's frame.
             let normal = Vec3::new(contact.normal1.x, contact.normal1.y, contact.normal1.z);
-            let point = Vec3::new(contact.point1.x, contact.point1.y, contact.point1.z);
+            let point = Vec3::new(contact.point1.x, contact.point1.y, contact.point1.z) + clearance * normal;
             let (normal, point) = (rot.transpose() * normal, rot.transpose() * (point - trans));
             hull = clip(&hull, normal, normal.dot(point))?;
             if !(hull.mass_integrals().volume > LEAST_LEFT * whole) {

@@ -18,7 +18,7 @@ pub fn run(session: &Session, args: &Demo) -> Result<Outcome> {
     let (recording, run) = (out.join("recording"), out.join("run"));
     RunFolder::may_become_run(&run)?;
     if !recording.join("transforms.json").exists() {
-        let config = SynthConfig { states: 12, views: 40, size: 192, ..Default::default() };
+        let config = SynthConfig { views: 30, size: 192, ..Default::default() };
         synth::record(session, &args.object, &config, &recording)?;
     }
     let config = Config::preset(Preset::Fast);
