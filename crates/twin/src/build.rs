@@ -87,7 +87,7 @@ pub fn build<E: From<Cancelled> + Send>(
                 q_from_part.iter().any(|pose| field.at(pose.apply(x.as_dvec3()).as_vec3()) < 0.0)
             })
         };
-        let field = volume.field(&taken);
+        let field = volume.field(&taken, tree.joint_of(part).is_some());
         fields[part] = Some(field);
     }
     progress.check()?;

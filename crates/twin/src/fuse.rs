@@ -157,8 +157,9 @@ impl PartVolume {
     }
 
     /// The dense field. `taken(x)` says that canonical point `x` is inside a part that is already built:
-    /// space that no ray reached is then not this part's.
-    pub fn field(&self, taken: &(dyn Fn(Vec3) -> bool + Sync)) -> Field {
+    /// space that no ray reached is then not this part's. With `enclosed`, unreached space is solid only where the
+    /// part's own surface encloses it; without (the root, whose underside no camera sees) everywhere.
+    pub fn field(&self, taken: &(dyn Fn(Vec3) -> bool + Sync), enclosed: bool) -> Field {
         // One voxel of empty border on each side closes the surface.
         let n = |a: usize| ((self.hi[a] - self.lo[a] + 1) * B) as usize + 2;
         let dims = [n(2), n(1), n(0)];
@@ -189,6 +190,9 @@ impl PartVolume {
         }
         let (origin, voxel) = (field.origin, field.voxel);
         self.keep_sheets(&mut field);
+        if enclosed {
+            field.open_unreached();
+        }
         field.values.par_iter_mut().enumerate().for_each(|(i, value)| {
             if !field.known[i] {
                 let (x, y, z) = (i % dims[0], i / dims[0] % dims[1], i / (dims[0] * dims[1]));
@@ -252,6 +256,34 @@ fn count_hits(blocks: &[Block], seen: &Observation, world_from_canonical: &Pose,
 }
 
 impl Field {
+    /// Empties unknown space that connects to the grid's border without crossing the surface.
+    fn open_unreached(&mut self) {
+        let [nx, ny, nz] = self.dims;
+        let passable = |f: &Field, i: usize| !f.known[i] || f.values[i] >= 0.0;
+        let mut seen = vec![false; self.values.len()];
+        // The border is empty all around, so one corner reaches all of it.
+        let mut stack = vec![0usize];
+        seen[0] = true;
+        while let Some(i) = stack.pop() {
+            if !self.known[i] {
+                self.values[i] = 1.0;
+            }
+            let (x, y, z) = (i % nx, i / nx % ny, i / (nx * ny));
+            let mut visit = |ok: bool, j: usize| {
+                if ok && !seen[j] && passable(self, j) {
+                    seen[j] = true;
+                    stack.push(j);
+                }
+            };
+            visit(x > 0, i.wrapping_sub(1));
+            visit(x + 1 < nx, i + 1);
+            visit(y > 0, i.wrapping_sub(nx));
+            visit(y + 1 < ny, i + nx);
+            visit(z > 0, i.wrapping_sub(nx * ny));
+            visit(z + 1 < nz, i + nx * ny);
+        }
+    }
+
     pub fn index(&self, x: usize, y: usize, z: usize) -> usize {
         (z * self.dims[1] + y) * self.dims[0] + x
     }

@@ -2,9 +2,10 @@
 //! of a drawer, the back of a door).
 //!
 //! Each such point is carried along with every part in turn into the other states. Where some camera looks
-//! through it, it cannot belong to that part; where a surface is measured at it, it may.
+//! through it, it cannot belong to that part; where a surface is measured at it, it may. Labels that the gaussians
+//! gave are put to the same test and lose when the other states clearly prefer another part.
 
-use crate::{BACKGROUND, Observation, UNKNOWN};
+use crate::{BACKGROUND, Observation};
 use glam::{DVec3, Mat3, Vec3};
 use hingecast_geom::Pose;
 use rayon::prelude::*;
@@ -47,6 +48,12 @@ struct Verdict {
     support: u32,
 }
 
+/// Votes (states) by which another part must lead to take a point from the part that the gaussians gave it.
+const CLEARLY: u32 = 3;
+
+/// A cube of one state's surface and the label that its points carry.
+type Cell = ([i32; 3], u8);
+
 /// Gives unknown pixels that have depth the part with the fewest contradictions, then the most support; ties go to
 /// the lowest part (the root). `labels[i]` are those of observation `i`; `poses[state][part]` world from canonical;
 /// `cell` is the edge of the cubes in which points are judged together, scene units.
@@ -60,12 +67,12 @@ pub fn resolve<E: Send>(
     if n_parts < 2 {
         return Ok(());
     }
-    // Cells of unknown surface per state: sum of points, count.
+    // Cells of surface per state: sum of points, count.
     let observations = (0..labels.len()).into_par_iter().map(load).collect::<Result<Vec<_>, E>>()?;
-    let mut cells: Vec<BTreeMap<[i32; 3], (DVec3, f64)>> = vec![BTreeMap::new(); poses.len()];
+    let mut cells: Vec<BTreeMap<Cell, (DVec3, f64)>> = vec![BTreeMap::new(); poses.len()];
     for (seen, labels) in observations.iter().zip(labels.iter()) {
-        for_unknown(seen, labels, &mut |_, x| {
-            let slot = cells[seen.state].entry(key(x, cell)).or_insert((DVec3::ZERO, 0.0));
+        for_surface(seen, labels, &mut |i, x| {
+            let slot = cells[seen.state].entry((key(x, cell), labels[i])).or_insert((DVec3::ZERO, 0.0));
             slot.0 += x;
             slot.1 += 1.0;
         });
@@ -81,7 +88,7 @@ pub fn resolve<E: Send>(
             (state, views.map(|&i| Witness::new(&observations[i], &labels[i])).collect())
         })
         .collect();
-    let verdicts: Vec<BTreeMap<[i32; 3], u8>> = cells
+    let verdicts: Vec<BTreeMap<Cell, u8>> = cells
         .par_iter()
         .enumerate()
         .map(|(state, cells)| {
@@ -89,7 +96,7 @@ pub fn resolve<E: Send>(
             let there_from_here: Vec<Vec<Pose>> = (0..n_parts)
                 .map(|p| asked.iter().map(|(s, _)| poses[*s][p] * poses[state][p].inverse()).collect())
                 .collect();
-            let judge = |x: DVec3| {
+            let judge = |x: DVec3, label: u8| {
                 let verdict = |part: usize| {
                     let others = asked.iter().zip(&there_from_here[part]).filter(|((s, _), _)| *s != state);
                     others.map(|((_, views), pose)| ask(pose.apply(x).as_vec3(), views, cell as f32)).fold(
@@ -98,18 +105,26 @@ pub fn resolve<E: Send>(
                     )
                 };
                 let all: Vec<Verdict> = (0..n_parts).map(verdict).collect();
-                (0..n_parts).min_by_key(|p| (all[*p].against, u32::MAX - all[*p].support, *p)).unwrap_or(0) as u8
+                let best = (0..n_parts).min_by_key(|p| (all[*p].against, u32::MAX - all[*p].support, *p)).unwrap_or(0);
+                match all.get(label as usize) {
+                    // A given label stays unless the other states clearly prefer another part.
+                    Some(own)
+                        if own.against + CLEARLY > all[best].against && own.support + CLEARLY > all[best].support =>
+                    {
+                        label
+                    }
+                    _ => best as u8,
+                }
             };
-            cells.iter().map(|(k, (sum, n))| (*k, judge(*sum / *n))).collect()
+            cells.iter().map(|(k, (sum, n))| (*k, judge(*sum / *n, k.1))).collect()
         })
         .collect();
     drop(asked);
     labels.par_iter_mut().zip(&observations).for_each(|(labels, seen)| {
         let mut found = Vec::new();
-        for_unknown(seen, labels, &mut |i, x| {
-            if let Some(part) = verdicts[seen.state].get(&key(x, cell)) {
-                found.push((i, *part));
-            }
+        for_surface(seen, labels, &mut |i, x| match verdicts[seen.state].get(&(key(x, cell), labels[i])) {
+            Some(part) if *part != labels[i] => found.push((i, *part)),
+            _ => {}
         });
         for (i, part) in found {
             labels[i] = part;
@@ -122,13 +137,13 @@ fn key(x: DVec3, cell: f64) -> [i32; 3] {
     (x / cell).floor().as_ivec3().to_array()
 }
 
-/// Calls `emit(pixel, world point)` for every unknown pixel with depth.
-fn for_unknown(seen: &Observation, labels: &[u8], emit: &mut dyn FnMut(usize, DVec3)) {
+/// Calls `emit(pixel, world point)` for every pixel of the object with depth.
+fn for_surface(seen: &Observation, labels: &[u8], emit: &mut dyn FnMut(usize, DVec3)) {
     let c = &seen.camera;
     let world_from_camera = c.camera_from_world.inverse();
     for (i, label) in labels.iter().enumerate() {
         let z = seen.depth[i] as f64;
-        if *label == UNKNOWN && z > 0.0 {
+        if *label != BACKGROUND && z > 0.0 {
             let (u, v) = ((i % c.width) as f64 + 0.5, (i / c.width) as f64 + 0.5);
             emit(i, world_from_camera.apply(DVec3::new((u - c.cx) / c.fx, (v - c.cy) / c.fy, 1.0) * z));
         }
