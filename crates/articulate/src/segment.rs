@@ -105,8 +105,7 @@ pub fn run(
         motions = rigid_motions(tracks, &labels, k);
         progress.check()?;
     }
-    let (order, motions) = sort_and_merge(tracks, &labels, motions, diagonal, config);
-    let _ = order;
+    let motions = sort_and_merge(tracks, &labels, motions, diagonal, config);
     let neighbours = crate::track::neighbours(&tracks.means[0], 12);
     let labels = assign(tracks, &motions, Some(&neighbours));
     Ok(Segmentation { labels, motions, silhouettes })
@@ -242,7 +241,7 @@ fn sort_and_merge(
     motions: Vec<Vec<Pose>>,
     diagonal: f64,
     config: &Config,
-) -> (Vec<usize>, Vec<Vec<Pose>>) {
+) -> Vec<Vec<Pose>> {
     let k = motions.len();
     let members: Vec<Vec<DVec3>> = (0..k)
         .map(|p| {
@@ -281,8 +280,7 @@ fn sort_and_merge(
         }
     }
     if kept.is_empty() {
-        return (vec![0], vec![still]);
+        return vec![still];
     }
-    let motions = kept.iter().map(|&p| motions[p].clone()).collect();
-    (kept, motions)
+    kept.iter().map(|&p| motions[p].clone()).collect()
 }

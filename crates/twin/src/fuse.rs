@@ -6,7 +6,7 @@
 //! closed things come out closed and have a volume. Units: scene units; frame: canonical world.
 
 use crate::{BACKGROUND, Observation, UNKNOWN};
-use glam::{DVec3, Vec3};
+use glam::Vec3;
 use hingecast_geom::{Cancelled, Pose};
 use rayon::prelude::*;
 use std::collections::BTreeMap;
@@ -90,10 +90,7 @@ impl PartVolume {
             if label != part || !(depth > 0.0) || (i % w + i / w) % 2 == 1 {
                 continue;
             }
-            let (u, v) = ((i % w) as f64 + 0.5, (i / w) as f64 + 0.5);
-            let c = &seen.camera;
-            let ray = DVec3::new((u - c.cx) / c.fx, (v - c.cy) / c.fy, 1.0);
-            let x = canonical_from_camera.apply(ray * depth as f64).as_vec3();
+            let x = canonical_from_camera.apply(seen.camera_point(i)).as_vec3();
             let (lo, hi) = ((x - reach) / size, (x + reach) / size);
             for bz in lo.z.floor() as i32..=hi.z.floor() as i32 {
                 for by in lo.y.floor() as i32..=hi.y.floor() as i32 {
@@ -237,16 +234,13 @@ impl PartVolume {
 
 /// Counts the part's surface pixels per voxel. Sums of integers: the order of threads does not matter.
 fn count_hits(blocks: &[Block], seen: &Observation, world_from_canonical: &Pose, part: u8, voxel: f32) {
-    let c = &seen.camera;
-    let canonical_from_camera = world_from_canonical.inverse() * c.camera_from_world.inverse();
+    let canonical_from_camera = world_from_canonical.inverse() * seen.camera.camera_from_world.inverse();
     for (i, &label) in seen.labels.iter().enumerate() {
         let depth = seen.depth[i];
         if label != part || !(depth > 0.0) {
             continue;
         }
-        let (u, v) = ((i % c.width) as f64 + 0.5, (i / c.width) as f64 + 0.5);
-        let ray = DVec3::new((u - c.cx) / c.fx, (v - c.cy) / c.fy, 1.0);
-        let x = (canonical_from_camera.apply(ray * depth as f64) / voxel as f64).floor().as_ivec3();
+        let x = (canonical_from_camera.apply(seen.camera_point(i)) / voxel as f64).floor().as_ivec3();
         let key = [x.z.div_euclid(B), x.y.div_euclid(B), x.x.div_euclid(B)];
         if let Ok(b) = blocks.binary_search_by_key(&key, |b| b.key) {
             let inner = (x.z.rem_euclid(B) * B + x.y.rem_euclid(B)) * B + x.x.rem_euclid(B);

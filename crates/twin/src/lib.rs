@@ -45,6 +45,15 @@ pub struct Observation {
     pub rgb: Vec<u8>,
 }
 
+impl Observation {
+    /// Where pixel `i` measured a surface, camera frame; meaningless where its depth is unknown.
+    fn camera_point(&self, i: usize) -> DVec3 {
+        let c = &self.camera;
+        let (u, v) = ((i % c.width) as f64 + 0.5, (i / c.width) as f64 + 0.5);
+        DVec3::new((u - c.cx) / c.fx, (v - c.cy) / c.fy, 1.0) * self.depth[i] as f64
+    }
+}
+
 /// Mass properties of a part about its own centre of mass, axes of the canonical world.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Inertial {

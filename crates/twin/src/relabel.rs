@@ -139,13 +139,10 @@ fn key(x: DVec3, cell: f64) -> [i32; 3] {
 
 /// Calls `emit(pixel, world point)` for every pixel of the object with depth.
 fn for_surface(seen: &Observation, labels: &[u8], emit: &mut dyn FnMut(usize, DVec3)) {
-    let c = &seen.camera;
-    let world_from_camera = c.camera_from_world.inverse();
+    let world_from_camera = seen.camera.camera_from_world.inverse();
     for (i, label) in labels.iter().enumerate() {
-        let z = seen.depth[i] as f64;
-        if *label != BACKGROUND && z > 0.0 {
-            let (u, v) = ((i % c.width) as f64 + 0.5, (i / c.width) as f64 + 0.5);
-            emit(i, world_from_camera.apply(DVec3::new((u - c.cx) / c.fx, (v - c.cy) / c.fy, 1.0) * z));
+        if *label != BACKGROUND && seen.depth[i] > 0.0 {
+            emit(i, world_from_camera.apply(seen.camera_point(i)));
         }
     }
 }

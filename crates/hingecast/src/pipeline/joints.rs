@@ -80,19 +80,11 @@ pub fn run_joints(context: &Context, run: &Path, at: &Path) -> Result<()> {
     let segmentation =
         segment::Segmentation { labels: parts.labels.clone(), motions: parts.motions, silhouettes: parts.silhouettes };
     let (tree, mut doubts) = joints::run(&segmentation, &points, diagonal, &context.config.joints, context.config.seed);
-    if let [.., (k, best)] = best_two(&segmentation.silhouettes)[..]
-        && best < 0.5
-    {
+    let best = segmentation.silhouettes.iter().max_by(|a, b| a.1.total_cmp(&b.1));
+    if let Some((k, best)) = best.filter(|b| b.1 < 0.5) {
         doubts.push(format!("the grouping into {k} parts is weak (silhouette {best:.2} of 1)"));
     }
     write_json(&at.join("joints.json"), &JointsFile { tree, labels: segmentation.labels, doubts })
-}
-
-/// Silhouettes in rising order.
-fn best_two(silhouettes: &[(usize, f64)]) -> Vec<(usize, f64)> {
-    let mut sorted = silhouettes.to_vec();
-    sorted.sort_by(|a, b| a.1.total_cmp(&b.1));
-    sorted
 }
 
 /// Points and normals of `surface` per part: the part of the nearest gaussian within `reach`.
