@@ -19,6 +19,11 @@ impl Surface {
         let tree = PointTree::new(&points);
         Self { points, normals, tree }
     }
+
+    /// Index and squared distance of the nearest point.
+    pub fn nearest(&self, x: Vec3) -> Option<(usize, f32)> {
+        self.tree.nearest(x)
+    }
 }
 
 /// How well the aligned points lie on the surface.

@@ -17,6 +17,7 @@ pub mod icp;
 pub mod joints;
 pub mod motion;
 pub mod physics;
+pub mod screw;
 pub mod segment;
 pub mod track;
 

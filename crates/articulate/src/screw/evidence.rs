@@ -1,0 +1,167 @@
+//! All states' surfaces and spaces, and what they say about a motion.
+
+use super::cloud::{DepthView, gather};
+use super::space::{Answer, Lattice, Space};
+use crate::icp::Surface;
+use glam::{Mat3, Vec3};
+use hingecast_geom::{PointTree, Pose};
+use rayon::prelude::*;
+
+/// A rigid motion in f32, quick to apply.
+#[derive(Clone, Copy, Debug)]
+pub struct Motion {
+    pub rot: Mat3,
+    pub trans: Vec3,
+}
+
+impl Motion {
+    #[inline]
+    pub fn apply(&self, x: Vec3) -> Vec3 {
+        self.rot * x + self.trans
+    }
+}
+
+impl From<Pose> for Motion {
+    fn from(p: Pose) -> Self {
+        Self { rot: p.mat3().as_mat3(), trans: p.trans.as_vec3() }
+    }
+}
+
+/// One oriented point of one state's surface, world frame.
+#[derive(Clone, Copy, Debug)]
+pub struct Sample {
+    pub state: usize,
+    pub point: Vec3,
+    pub normal: Vec3,
+}
+
+/// Per sample, one bit a state: where its predicted place was seen empty, and where a surface was found there.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Verdict {
+    pub against: u64,
+    pub support: u64,
+}
+
+/// Most states that witness at once (bits of a [`Verdict`]).
+pub const MOST_STATES: usize = 64;
+/// Samples per state that labels are decided on.
+const PER_STATE: usize = 2500;
+/// Neighbours that must mostly agree before a contradiction counts.
+const NEIGHBOURS: usize = 8;
+
+pub struct Evidence {
+    pub lattice: Lattice,
+    /// Every sample of each state's surface.
+    pub clouds: Vec<Surface>,
+    pub spaces: Vec<Space>,
+    /// A subset of all clouds, state after state.
+    pub samples: Vec<Sample>,
+    /// Nearest samples of the same state. [sample][NEIGHBOURS]
+    pub neighbours: Vec<Vec<u32>>,
+}
+
+impl Evidence {
+    /// `states(s)` answers the views of state s; they are dropped before the next state is asked for.
+    pub fn gather<E>(
+        n_states: usize,
+        lattice: Lattice,
+        states: &mut dyn FnMut(usize) -> Result<Vec<DepthView>, E>,
+        seed: u64,
+    ) -> Result<Self, E> {
+        let (mut clouds, mut spaces, mut samples) = (Vec::new(), Vec::new(), Vec::new());
+        let mut neighbours = Vec::new();
+        let mut rng = fastrand::Rng::with_seed(seed ^ 0x5a3b);
+        for state in 0..n_states {
+            let views = states(state)?;
+            let least = if views.len() >= 8 { 2 } else { 1 };
+            let cloud = gather(&views, lattice.voxel, 1, least);
+            spaces.push(Space::new(lattice, &cloud, &views, 1.5));
+            let mut order: Vec<usize> = (0..cloud.points.len()).collect();
+            rng.shuffle(&mut order);
+            order.truncate(PER_STATE);
+            order.sort_unstable();
+            let first = samples.len() as u32;
+            let points: Vec<Vec3> = order.iter().map(|&i| cloud.points[i]).collect();
+            let tree = PointTree::new(&points);
+            neighbours.par_extend(points.par_iter().map(|x| {
+                let near = tree.k_nearest(*x, NEIGHBOURS + 1);
+                near.into_iter().skip(1).map(|j| first + j).collect::<Vec<u32>>()
+            }));
+            samples.extend(
+                order.iter().map(|&i| Sample { state, point: cloud.points[i], normal: cloud.normals[i] }),
+            );
+            clouds.push(Surface::new(cloud.points, cloud.normals));
+        }
+        Ok(Self { lattice, clouds, spaces, samples, neighbours })
+    }
+
+    pub fn n_states(&self) -> usize {
+        self.spaces.len()
+    }
+
+    /// World at state `t` from world at state `a`, for something that moves with `poses` (world from canonical). [a][t]
+    fn between(&self, poses: &[Pose]) -> Vec<Vec<Motion>> {
+        let inverse: Vec<Pose> = poses.iter().map(Pose::inverse).collect();
+        inverse.iter().map(|i| poses.iter().map(|p| Motion::from(*p * *i)).collect()).collect()
+    }
+
+    fn ask_all(&self, s: &Sample, from: &[Motion]) -> Verdict {
+        let mut v = Verdict::default();
+        for (t, m) in from.iter().enumerate().filter(|(t, _)| *t != s.state) {
+            match self.spaces[t].ask(m.apply(s.point), m.rot * s.normal) {
+                Answer::Free => v.against |= 1 << t,
+                Answer::Surface => v.support |= 1 << t,
+                Answer::Silent => {}
+            }
+        }
+        v
+    }
+
+    /// What all states say about every sample if it moved with `poses` (world from canonical, per state).
+    pub fn judge(&self, poses: &[Pose]) -> Vec<Verdict> {
+        let between = self.between(poses);
+        let raw: Vec<Verdict> = self.samples.par_iter().map(|s| self.ask_all(s, &between[s.state])).collect();
+        // Lone contradictions are noise.
+        (0..raw.len())
+            .into_par_iter()
+            .map(|i| {
+                let mut v = raw[i];
+                let mut bits = v.against;
+                while bits != 0 {
+                    let t = bits.trailing_zeros();
+                    bits &= bits - 1;
+                    let near = &self.neighbours[i];
+                    let agree = near.iter().filter(|&&j| raw[j as usize].against >> t & 1 == 1).count();
+                    if 2 * agree < near.len() {
+                        v.against &= !(1 << t);
+                    }
+                }
+                v
+            })
+            .collect()
+    }
+
+    /// Marks the surface cells that one of `parts` explains: never contradicted, and confirmed by half of the states.
+    pub fn mark_taken(&mut self, parts: &[Vec<Pose>]) {
+        let n = self.n_states();
+        let between: Vec<_> = parts.iter().map(|p| self.between(p)).collect();
+        let marks: Vec<Vec<usize>> = (0..n)
+            .into_par_iter()
+            .map(|state| {
+                let cloud = &self.clouds[state];
+                let taken = |&i: &usize| {
+                    let s = Sample { state, point: cloud.points[i], normal: cloud.normals[i] };
+                    between.iter().any(|b| {
+                        let v = self.ask_all(&s, &b[state]);
+                        v.against == 0 && 2 * v.support.count_ones() as usize >= n - 1
+                    })
+                };
+                (0..cloud.points.len()).filter(taken).collect()
+            })
+            .collect();
+        for (state, marks) in marks.into_iter().enumerate() {
+            let points: Vec<Vec3> = marks.into_iter().map(|i| self.clouds[state].points[i]).collect();
+            self.spaces[state].mark_taken(&points);
+        }
+    }
+}

@@ -1,0 +1,276 @@
+//! The last digits: all joints and their values by Gauss-Newton in f64, point to plane, between all states.
+//!
+//! A sample of part k seen in state a is carried to state t by M = P_k(t) P_k(a)^-1 and compared with the plane measured
+//! there: r = n . (M x - y). Every joint on the way from k to the root moves it: a change of a parameter turns
+//! P_k(t) into exp(xi_t) P_k(t), with the twist xi in the world frame, so dr = n . (xi_t(M x) - R_M xi_a(x)).
+//!
+//! Twists of a joint in its parent's frame, with motion T = T(q), axis a through c, and b square to a:
+//! its value: the screw itself; its axis turned about b at c, or shifted along b: e - Ad_T e, since the new motion
+//! is exp(e) T exp(-e).
+
+use super::evidence::{Evidence, Motion, Sample};
+use glam::{DMat3, DVec3};
+use hingecast_geom::pose::quat_from_rotation_vector;
+use hingecast_geom::{JointKind, KinematicTree, Pose};
+use nalgebra::{DMatrix, DVector};
+use rayon::prelude::*;
+
+/// Angular and linear velocity of a rigid motion about the world's origin.
+#[derive(Clone, Copy, Debug)]
+struct Twist {
+    w: DVec3,
+    v: DVec3,
+}
+
+impl Twist {
+    fn about(axis: DVec3, through: DVec3) -> Self {
+        Self { w: axis, v: through.cross(axis) }
+    }
+
+    fn shift(direction: DVec3) -> Self {
+        Self { w: DVec3::ZERO, v: direction }
+    }
+
+    /// The same twist seen from the frame that `pose` leads to.
+    fn moved(&self, pose: &Pose) -> Self {
+        let w = pose.rotate(self.w);
+        Self { w, v: pose.rotate(self.v) + pose.trans.cross(w) }
+    }
+
+    fn minus(&self, o: &Self) -> Self {
+        Self { w: self.w - o.w, v: self.v - o.v }
+    }
+
+    fn at(&self, x: DVec3) -> DVec3 {
+        self.v + self.w.cross(x)
+    }
+}
+
+#[derive(Clone, Copy, Debug)]
+pub struct Settings {
+    /// Largest accepted distance in the first and the last round, scene units.
+    pub gates: [f64; 2],
+    pub rounds: usize,
+    /// Other states that each sample is compared with per round.
+    pub partners: usize,
+}
+
+/// What the last round knew.
+#[derive(Clone, Debug, Default)]
+pub struct Report {
+    /// Root mean square of the accepted residuals, scene units.
+    pub rms: f64,
+    /// Accepted residuals.
+    pub rows: usize,
+    /// Standard deviations per joint: axis [rad], pivot [scene units], value (mean over states).
+    pub sigmas: Vec<[f64; 3]>,
+}
+
+/// Directions square to `a`.
+fn square(a: DVec3) -> [DVec3; 2] {
+    let b = a.any_orthonormal_vector();
+    [b, a.cross(b)]
+}
+
+/// Where a joint's parameters stand in the unknowns: axis 2, pivot 2 (hinges), values from state 1 on.
+#[derive(Clone, Copy)]
+struct Slot {
+    shape: usize,
+    n_shape: usize,
+    values: usize,
+}
+
+/// Improves the joints for which `free` says so, in place. `members`: samples and their parts.
+pub fn refine(
+    evidence: &Evidence,
+    tree: &mut KinematicTree,
+    members: &[(Sample, usize)],
+    free: &[bool],
+    settings: &Settings,
+    seed: u64,
+) -> Report {
+    let n_states = evidence.n_states();
+    let mut slots: Vec<Option<Slot>> = Vec::new();
+    let mut size = 0;
+    for (j, joint) in tree.joints.iter().enumerate() {
+        slots.push((free[j] && joint.screw.kind != JointKind::Fixed).then(|| {
+            let n_shape = if joint.screw.kind.turns() { 4 } else { 2 };
+            let slot = Slot { shape: size, n_shape, values: size + n_shape };
+            size += n_shape + n_states - 1;
+            slot
+        }));
+    }
+    let mut report = Report { sigmas: vec![[0.0; 3]; tree.joints.len()], ..Report::default() };
+    if size == 0 {
+        return report;
+    }
+    centre_pivots(tree, members);
+    let chains: Vec<Vec<usize>> = (0..tree.parts.len()).map(|p| chain(tree, p)).collect();
+    for round in 0..settings.rounds {
+        let share = round as f64 / (settings.rounds - 1).max(1) as f64;
+        let gate = settings.gates[0] * (settings.gates[1] / settings.gates[0]).powf(share);
+        let poses: Vec<Vec<Pose>> = (0..n_states).map(|s| tree.poses_at(s)).collect();
+        let twists: Vec<Vec<Vec<Twist>>> =
+            (0..n_states).map(|s| (0..tree.joints.len()).map(|j| twists(tree, j, s, &poses[s])).collect()).collect();
+        let chunks: Vec<(DMatrix<f64>, DVector<f64>, f64, usize)> = members
+            .par_chunks(4096)
+            .enumerate()
+            .map(|(c, chunk)| {
+                let mut rng = fastrand::Rng::with_seed(seed ^ ((round as u64) << 32) ^ c as u64);
+                let (mut a, mut b) = (DMatrix::zeros(size, size), DVector::zeros(size));
+                let (mut sum, mut weight, mut rows) = (0.0, 0.0, 0);
+                let mut row: Vec<(usize, f64)> = Vec::new();
+                for (sample, part) in chunk {
+                    let back = poses[sample.state][*part].inverse();
+                    for _ in 0..settings.partners.min(n_states - 1) {
+                        let t = (sample.state + 1 + rng.usize(..n_states - 1)) % n_states;
+                        let m = poses[t][*part] * back;
+                        let Some((r, n, x)) = residual(evidence, sample, t, &m, gate) else { continue };
+                        row.clear();
+                        let rotated = m.rot.conjugate() * n;
+                        for &j in &chains[*part] {
+                            let Some(slot) = slots[j] else { continue };
+                            let here = &twists[t][j];
+                            let there = &twists[sample.state][j];
+                            let d = |k: usize| n.dot(here[k].at(x)) - rotated.dot(there[k].at(sample.point.as_dvec3()));
+                            for k in 0..slot.n_shape {
+                                row.push((slot.shape + k, d(k)));
+                            }
+                            if t > 0 {
+                                row.push((slot.values + t - 1, n.dot(here[4].at(x))));
+                            }
+                            if sample.state > 0 {
+                                let g = rotated.dot(there[4].at(sample.point.as_dvec3()));
+                                row.push((slot.values + sample.state - 1, -g));
+                            }
+                        }
+                        // Geman and McClure: what lies far off hardly pulls.
+                        let w = (1.0 + (2.0 * r / gate).powi(2)).powi(-2);
+                        for &(i, gi) in &row {
+                            b[i] -= w * gi * r;
+                            for &(k, gk) in &row {
+                                a[(i, k)] += w * gi * gk;
+                            }
+                        }
+                        sum += w * r * r;
+                        weight += w;
+                        rows += 1;
+                    }
+                }
+                (a, b, sum / f64::max(weight, 1e-300), rows)
+            })
+            .collect();
+        let (mut a, mut b) = (DMatrix::zeros(size, size), DVector::zeros(size));
+        let (mut sum, mut rows) = (0.0, 0);
+        for chunk in chunks {
+            a += chunk.0;
+            b += chunk.1;
+            sum += chunk.2 * chunk.3 as f64;
+            rows += chunk.3;
+        }
+        report.rms = (sum / rows.max(1) as f64).sqrt();
+        report.rows = rows;
+        // Unseen states keep their value; a joint that nothing constrains keeps its place.
+        let scale = a.diagonal().max().max(1e-12);
+        for i in 0..size {
+            a[(i, i)] += 1e-6 * a[(i, i)] + 1e-9 * scale;
+        }
+        let Some(solved) = a.cholesky() else { break };
+        let step = solved.solve(&b);
+        update(tree, &slots, &step);
+        if round + 1 == settings.rounds {
+            let inverse = solved.inverse();
+            let variance = report.rms * report.rms;
+            for (j, slot) in slots.iter().enumerate() {
+                let Some(slot) = slot else { continue };
+                let sigma = |i: usize, n: usize| ((i..i + n).map(|k| inverse[(k, k)]).sum::<f64>() * variance).sqrt();
+                let pivot = if slot.n_shape == 4 { sigma(slot.shape + 2, 2) } else { 0.0 };
+                let values = sigma(slot.values, n_states - 1) / ((n_states - 1) as f64).sqrt();
+                report.sigmas[j] = [sigma(slot.shape, 2), pivot, values];
+            }
+        }
+    }
+    report
+}
+
+/// Distance to the plane found at state t, its normal, and the carried point.
+fn residual(evidence: &Evidence, s: &Sample, t: usize, m: &Pose, gate: f64) -> Option<(f64, DVec3, DVec3)> {
+    let x = m.apply(s.point.as_dvec3());
+    let normal = Motion::from(*m).rot * s.normal;
+    let cloud = &evidence.clouds[t];
+    let (i, squared) = cloud.nearest(x.as_vec3())?;
+    let n = cloud.normals[i];
+    let reach = (gate as f32).max(1.2 * evidence.lattice.voxel);
+    if squared > reach * reach || n.dot(normal) < 0.85 {
+        return None;
+    }
+    // The bisecting normal is right to second order on curved surfaces.
+    let n = (n + normal).normalize().as_dvec3();
+    let r = n.dot(x - cloud.points[i].as_dvec3());
+    (r.abs() < gate).then_some((r, n, x))
+}
+
+/// World twists at state s of joint j: axis tilts 2, pivot shifts 2, value.
+fn twists(tree: &KinematicTree, j: usize, s: usize, poses: &[Pose]) -> Vec<Twist> {
+    let joint = &tree.joints[j];
+    let (axis, pivot) = (joint.screw.axis, joint.screw.pivot);
+    let motion = joint.screw.motion(joint.values[s]);
+    let parent = poses[joint.parent];
+    let world = |e: Twist| e.minus(&e.moved(&motion)).moved(&parent);
+    let [b1, b2] = square(axis);
+    let value = if joint.screw.kind.turns() { Twist::about(axis, pivot) } else { Twist::shift(axis) };
+    vec![
+        world(Twist::about(b1, pivot)),
+        world(Twist::about(b2, pivot)),
+        world(Twist::shift(b1)),
+        world(Twist::shift(b2)),
+        value.moved(&parent),
+    ]
+}
+
+fn update(tree: &mut KinematicTree, slots: &[Option<Slot>], step: &DVector<f64>) {
+    for (joint, slot) in tree.joints.iter_mut().zip(slots) {
+        let Some(slot) = slot else { continue };
+        let [b1, b2] = square(joint.screw.axis);
+        let at = |k: usize| step[slot.shape + k];
+        // A step longer than this is not one that the linearisation knows anything about.
+        let tilt = (b1 * at(0) + b2 * at(1)).clamp_length_max(0.2);
+        if slot.n_shape == 4 {
+            joint.screw.pivot += b1 * at(2) + b2 * at(3);
+        }
+        joint.screw.axis = (DMat3::from_quat(quat_from_rotation_vector(tilt)) * joint.screw.axis).normalize();
+        for (s, q) in joint.values.iter_mut().enumerate().skip(1) {
+            *q += step[slot.values + s - 1];
+        }
+    }
+}
+
+/// Joints between a part and the root.
+fn chain(tree: &KinematicTree, part: usize) -> Vec<usize> {
+    let (mut at, mut out) = (part, Vec::new());
+    while let Some(j) = tree.joints.iter().position(|j| j.child == at) {
+        out.push(j);
+        at = tree.joints[j].parent;
+        if out.len() > tree.joints.len() {
+            break;
+        }
+    }
+    out
+}
+
+/// Pivots slide along their axes to beside their part: far from it, tilt and shift would be hard to tell apart.
+fn centre_pivots(tree: &mut KinematicTree, members: &[(Sample, usize)]) {
+    let poses: Vec<Vec<Pose>> = (0..tree.joints.first().map_or(0, |j| j.values.len())).map(|s| tree.poses_at(s)).collect();
+    for j in 0..tree.joints.len() {
+        let (child, parent) = (tree.joints[j].child, tree.joints[j].parent);
+        let own = members.iter().filter(|m| m.1 == child);
+        let (sum, n) = own.fold((DVec3::ZERO, 0.0), |(sum, n), (s, _)| {
+            (sum + poses[s.state][parent].inverse().apply(s.point.as_dvec3()), n + 1.0)
+        });
+        if n > 0.0 {
+            let centre = sum / n;
+            let screw = &mut tree.joints[j].screw;
+            screw.pivot = if screw.kind.turns() { screw.foot(centre) } else { centre };
+        }
+    }
+}
