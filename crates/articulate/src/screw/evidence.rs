@@ -44,8 +44,9 @@ pub struct Verdict {
 
 /// Most states that witness at once (bits of a [`Verdict`]).
 pub const MOST_STATES: usize = 64;
-/// Samples per state that labels are decided on.
-const PER_STATE: usize = 2500;
+/// Samples that labels are decided on: in all, and at most per state.
+const SAMPLES: usize = 62_500;
+const PER_STATE: usize = 8000;
 /// Neighbours that must mostly agree before a contradiction counts.
 const NEIGHBOURS: usize = 8;
 
@@ -58,6 +59,8 @@ pub struct Evidence {
     pub samples: Vec<Sample>,
     /// Nearest samples of the same state. [sample][NEIGHBOURS]
     pub neighbours: Vec<Vec<u32>>,
+    /// Distance to the plane within which two measurements are the same surface, scene units.
+    pub tolerance: f32,
 }
 
 impl Evidence {
@@ -78,7 +81,7 @@ impl Evidence {
             spaces.push(Space::new(lattice, &cloud, &views, 1.5));
             let mut order: Vec<usize> = (0..cloud.points.len()).collect();
             rng.shuffle(&mut order);
-            order.truncate(PER_STATE);
+            order.truncate((SAMPLES / n_states).min(PER_STATE));
             order.sort_unstable();
             let first = samples.len() as u32;
             let points: Vec<Vec3> = order.iter().map(|&i| cloud.points[i]).collect();
@@ -92,20 +95,59 @@ impl Evidence {
             );
             clouds.push(Surface::new(cloud.points, cloud.normals));
         }
-        Ok(Self { lattice, clouds, spaces, samples, neighbours })
+        let mut evidence = Self { lattice, clouds, spaces, samples, neighbours, tolerance: 0.2 * lattice.voxel };
+        evidence.tolerance = evidence.tolerance.max(4.0 * evidence.noise());
+        Ok(evidence)
     }
 
     pub fn n_states(&self) -> usize {
         self.spaces.len()
     }
 
+    /// Median distance between a sample and the plane that another state measured where the sample stands still.
+    fn noise(&self) -> f32 {
+        let mut off: Vec<f32> = (0..self.samples.len())
+            .into_par_iter()
+            .step_by(7)
+            .filter_map(|i| {
+                let s = &self.samples[i];
+                let t = (s.state + 1 + i % (self.n_states() - 1).max(1)) % self.n_states();
+                if t == s.state {
+                    return None;
+                }
+                self.plane_distance(t, s.point, s.normal)
+            })
+            .collect();
+        if off.is_empty() {
+            return 0.0;
+        }
+        let half = off.len() / 2;
+        // Median to standard deviation.
+        *off.select_nth_unstable_by(half, f32::total_cmp).1 / 0.6745
+    }
+
+    /// Distance from the plane of state t's sample nearest to `x`, if it lies within a voxel and faces the same way.
+    fn plane_distance(&self, t: usize, x: Vec3, n: Vec3) -> Option<f32> {
+        let cloud = &self.clouds[t];
+        let (i, squared) = cloud.nearest(x)?;
+        let reach = 1.1 * self.lattice.voxel;
+        let m = cloud.normals[i];
+        (squared < reach * reach && m.dot(n) > 0.85).then(|| m.dot(x - cloud.points[i]).abs())
+    }
+
+    /// Whether state t measured a surface at `x` that faces along `n`, within the noise.
+    pub fn meets(&self, t: usize, x: Vec3, n: Vec3) -> bool {
+        self.plane_distance(t, x, n).is_some_and(|d| d < self.tolerance)
+    }
+
     /// World at state `t` from world at state `a`, for something that moves with `poses` (world from canonical). [a][t]
-    fn between(&self, poses: &[Pose]) -> Vec<Vec<Motion>> {
+    pub fn between(&self, poses: &[Pose]) -> Vec<Vec<Motion>> {
         let inverse: Vec<Pose> = poses.iter().map(Pose::inverse).collect();
         inverse.iter().map(|i| poses.iter().map(|p| Motion::from(*p * *i)).collect()).collect()
     }
 
-    fn ask_all(&self, s: &Sample, from: &[Motion]) -> Verdict {
+    /// The raw verdict on one sample; `from[t]`: world at t from world at its state.
+    pub fn ask_all(&self, s: &Sample, from: &[Motion]) -> Verdict {
         let mut v = Verdict::default();
         for (t, m) in from.iter().enumerate().filter(|(t, _)| *t != s.state) {
             match self.spaces[t].ask(m.apply(s.point), m.rot * s.normal) {

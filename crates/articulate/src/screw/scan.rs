@@ -48,7 +48,7 @@ pub fn scan(
         let mut best = (f32::NEG_INFINITY, 0.0);
         for &q in &grid {
             let m = Motion::from(*place * screw.motion(q));
-            let score = agreement(evidence, state, samples, &m, best.0);
+            let score = at_least(evidence, state, samples, &m, best.0);
             // Of equals the smaller motion.
             if score > best.0 + 1e-6 || (score > best.0 - 1e-6 && q.abs() < f64::abs(best.1)) {
                 best = (score, q);
@@ -60,8 +60,13 @@ pub fn scan(
     Scan { values, scores }
 }
 
-/// Share of the samples that meet surface, minus what enters empty space. Gives up below `floor`.
-fn agreement(evidence: &Evidence, state: usize, samples: &[Sample], m: &Motion, floor: f32) -> f32 {
+/// Share of the samples that meet surface, minus what enters empty space.
+pub fn agreement(evidence: &Evidence, state: usize, samples: &[Sample], m: &Motion) -> f32 {
+    at_least(evidence, state, samples, m, f32::NEG_INFINITY)
+}
+
+/// The agreement, or little once it is sure to stay below `floor`.
+fn at_least(evidence: &Evidence, state: usize, samples: &[Sample], m: &Motion, floor: f32) -> f32 {
     let n = samples.len() as f32;
     let mut sum = 0.0;
     for (k, s) in samples.iter().enumerate() {

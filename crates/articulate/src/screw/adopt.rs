@@ -1,0 +1,84 @@
+//! A proposal becomes a part.
+
+use super::evidence::{Evidence, Motion, Sample};
+use super::propose::{CROWD, Proposal};
+use super::refine::{self, refine};
+use super::scan::{Scan, agreement, scan, whole_range};
+use hingecast_geom::{Joint, KinematicTree, Pose};
+
+/// Adds the proposal to the tree as a part; its screw and values are refined and asked again in turns, first with the
+/// source samples, then with everything that moves with it.
+pub fn adopt(evidence: &Evidence, tree: &mut KinematicTree, p: &Proposal, seed: u64) {
+    let n_states = evidence.n_states();
+    let child = tree.parts.len();
+    let place: Vec<Pose> = (0..n_states).map(|s| tree.poses_at(s)[p.parent]).collect();
+    tree.parts.push(format!("part_{child}"));
+    // Values count from state 0; the crowd stands where state `source` has it.
+    let zero = p.scan.values[0];
+    let values = p.scan.values.iter().map(|v| v - zero).collect();
+    let joint =
+        Joint { name: format!("joint_{child}"), parent: p.parent, child, screw: p.screw, values, limits: [0.0; 2] };
+    tree.joints.push(joint);
+    let voxel = evidence.lattice.voxel as f64;
+    let m = Motion::from(place[p.source]);
+    let world = |s: &Sample| Sample { state: p.source, point: m.apply(s.point), normal: m.rot * s.normal };
+    let crowd: Vec<Sample> = p.crowd.iter().map(world).collect();
+    for gate in [3.0, 1.5] {
+        polish(evidence, tree, &crowd, gate * voxel, n_states, seed);
+        rescan(evidence, tree, &crowd, &place);
+    }
+    for gate in [1.5, 1.0, 0.7] {
+        let own: Vec<Pose> = (0..n_states).map(|s| tree.poses_at(s)[child]).collect();
+        let (mine, parents) = (evidence.judge(&own), evidence.judge(&place));
+        let mut members: Vec<Sample> = (0..evidence.samples.len())
+            .filter(|&i| mine[i].against == 0 && mine[i].support != 0 && parents[i].against != 0)
+            .map(|i| evidence.samples[i])
+            .collect();
+        if members.len() < 20 {
+            break;
+        }
+        polish(evidence, tree, &members, gate * voxel, 4, seed);
+        fastrand::Rng::with_seed(seed).shuffle(&mut members);
+        members.truncate(2 * CROWD);
+        rescan(evidence, tree, &members, &place);
+    }
+    let joint = tree.joints.last_mut().expect("just pushed");
+    joint.limits = joint.values.iter().fold([0.0f64; 2], |l, v| [l[0].min(*v), l[1].max(*v)]);
+}
+
+/// Gauss-Newton on the last joint alone.
+fn polish(evidence: &Evidence, tree: &mut KinematicTree, members: &[Sample], gate: f64, partners: usize, seed: u64) {
+    let child = tree.parts.len() - 1;
+    let mut free = vec![false; tree.joints.len()];
+    free[child - 1] = true;
+    let members: Vec<(Sample, usize)> = members.iter().map(|s| (*s, child)).collect();
+    let settings = refine::Settings { gates: [gate, 0.5 * gate], rounds: 6, partners };
+    refine(evidence, tree, &members, &free, &settings, seed);
+}
+
+/// Asks every state anew for the last joint's value; keeps the old one unless another fits clearly better.
+fn rescan(evidence: &Evidence, tree: &mut KinematicTree, members: &[Sample], place: &[Pose]) -> Scan {
+    let joint = tree.joints.last().expect("a part was added");
+    // All samples in the parent's frame as of value 0.
+    let samples: Vec<Sample> = members
+        .iter()
+        .map(|s| {
+            let m = Motion::from((place[s.state] * joint.screw.motion(joint.values[s.state])).inverse());
+            Sample { state: s.state, point: m.apply(s.point), normal: m.rot * s.normal }
+        })
+        .collect();
+    let extent = (evidence.lattice.size.as_vec3() * evidence.lattice.voxel).max_element();
+    let range = whole_range(&joint.screw, extent);
+    let mut found = scan(evidence, &samples, place, &joint.screw, range, 1.0 * evidence.lattice.voxel);
+    for (s, parent) in place.iter().enumerate() {
+        let held = agreement(evidence, s, &samples, &Motion::from(*parent * joint.screw.motion(joint.values[s])));
+        if found.scores[s] < held + 0.05 {
+            found.values[s] = joint.values[s];
+            found.scores[s] = held;
+        }
+    }
+    let zero = found.values[0];
+    found.values.iter_mut().for_each(|v| *v -= zero);
+    tree.joints.last_mut().expect("a part was added").values.clone_from(&found.values);
+    found
+}

@@ -1,0 +1,64 @@
+//! How much of what is unexplained would a new part explain?
+
+use super::evidence::{Evidence, Motion, Sample, Verdict};
+use hingecast_geom::Pose;
+use rayon::prelude::*;
+
+/// Open samples that judge proposals.
+pub struct Jury {
+    /// Sample, and the fewest contradictions under a known part.
+    members: Vec<(Sample, u32)>,
+    /// Open samples per member.
+    weight: f64,
+}
+
+/// Most samples of the jury.
+const SIZE: usize = 4000;
+/// What a removed contradiction counts if a surface was only met in the grid, and if nobody saw where the sample went.
+const LOOSE: f64 = 0.3;
+const UNSEEN: f64 = 0.1;
+/// States in which a sample's distance to the surface is measured.
+const MEASURED: usize = 4;
+
+impl Jury {
+    pub fn new(evidence: &Evidence, open: &[usize], verdicts: &[Vec<Verdict>], seed: u64) -> Self {
+        let mut chosen = open.to_vec();
+        fastrand::Rng::with_seed(seed).shuffle(&mut chosen);
+        chosen.truncate(SIZE);
+        chosen.sort_unstable();
+        let fewest = |i: usize| verdicts.iter().map(|v| v[i].against.count_ones()).min().unwrap_or(0);
+        let weight = open.len() as f64 / chosen.len().max(1) as f64;
+        Self { members: chosen.into_iter().map(|i| (evidence.samples[i], fewest(i))).collect(), weight }
+    }
+
+    /// Contradictions that a part with these poses (world from canonical) removes. With `tight`, surface only counts
+    /// whole where it is met within the noise, and is not explained already.
+    pub fn gain(&self, evidence: &Evidence, poses: &[Pose], tight: bool) -> f64 {
+        let between = evidence.between(poses);
+        let each = |(s, fewest): &(Sample, u32)| {
+            let v = evidence.ask_all(s, &between[s.state]);
+            let removed = fewest.saturating_sub(v.against.count_ones()) as f64;
+            if removed == 0.0 || v.support == 0 {
+                return removed * UNSEEN;
+            }
+            if !tight {
+                return removed;
+            }
+            removed * (LOOSE + (1.0 - LOOSE) * closeness(evidence, s, &between[s.state], v.support))
+        };
+        // Summed in a fixed order.
+        self.members.par_iter().map(each).collect::<Vec<f64>>().iter().sum::<f64>() * self.weight
+    }
+}
+
+/// Share of some supporting states in which the sample meets the surface within the noise.
+fn closeness(evidence: &Evidence, s: &Sample, between: &[Motion], support: u64) -> f64 {
+    let states: Vec<usize> = (0..between.len()).filter(|t| support >> t & 1 == 1).collect();
+    let stride = states.len().div_ceil(MEASURED).max(1);
+    let (mut met, mut asked) = (0, 0);
+    for &t in states.iter().step_by(stride) {
+        asked += 1;
+        met += usize::from(evidence.meets(t, between[t].apply(s.point), between[t].rot * s.normal));
+    }
+    met as f64 / asked.max(1) as f64
+}

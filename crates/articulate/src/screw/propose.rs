@@ -1,0 +1,171 @@
+//! Candidates for a new part on one parent: pairs of states, hypotheses, alignment, and a question to all states.
+
+use super::evidence::{Evidence, Motion, Sample, Verdict};
+use super::hypotheses::{Duel, Hypothesis, distinct, nearest_screw};
+use super::jury::Jury;
+use super::scan::{Scan, centroid, points, scan, whole_range};
+use super::space::TAKEN;
+use crate::icp;
+use hingecast_geom::{JointKind, Pose, Screw};
+use rayon::prelude::*;
+
+/// Pairs of states per parent and round.
+const PAIRS: usize = 6;
+/// Hypotheses per pair that are aligned.
+const ALIGNED: usize = 60;
+/// Poses per parent that are asked in all states, each as a hinge and as a slide.
+const ASKED: usize = 36;
+/// Samples that ask.
+pub const CROWD: usize = 200;
+/// Fewer samples do not make a pair worth looking at, or a pose worth asking.
+const FEW: usize = 12;
+
+/// A screw on a parent, ready to become a part.
+pub struct Proposal {
+    pub parent: usize,
+    pub source: usize,
+    pub screw: Screw,
+    pub scan: Scan,
+    /// Contradictions of open samples that it removes.
+    pub gain: f64,
+    /// Source samples that take part, in the parent's canonical frame as of the source state.
+    pub crowd: Vec<Sample>,
+}
+
+/// Screws of a new part on `parent`, whose poses are `place` (world from its canonical frame).
+pub fn propose(
+    evidence: &Evidence,
+    parent: usize,
+    place: &[Pose],
+    open: &[usize],
+    verdicts: &[Vec<Verdict>],
+    jury: &Jury,
+    seed: u64,
+) -> Vec<Proposal> {
+    let n = evidence.n_states();
+    let verdict = &verdicts[parent];
+    // Open samples of state b that the parent's motion would put into empty space of state a.
+    let mut counts = vec![0usize; n * n];
+    for &i in open {
+        let b = evidence.samples[i].state;
+        (0..n).filter(|a| verdict[i].against >> a & 1 == 1).for_each(|a| counts[b * n + a] += 1);
+    }
+    let mut pairs: Vec<usize> = (0..n * n).filter(|&k| counts[k] >= FEW).collect();
+    pairs.sort_by(|x, y| counts[*y].cmp(&counts[*x]).then(x.cmp(y)));
+    let pairs = varied(&pairs, n);
+    let back: Vec<Pose> = place.iter().map(Pose::inverse).collect();
+    let mut all = Vec::new();
+    for (k, &pair) in pairs.iter().enumerate() {
+        let (b, a) = (pair / n, pair % n);
+        let into = |s: &Sample| Sample {
+            state: s.state,
+            point: Motion::from(back[s.state]).apply(s.point),
+            normal: Motion::from(back[s.state]).rot * s.normal,
+        };
+        let source: Vec<Sample> = open
+            .iter()
+            .filter(|&&i| evidence.samples[i].state == b && verdict[i].against >> a & 1 == 1)
+            .map(|&i| into(&evidence.samples[i]))
+            .collect();
+        let cloud = &evidence.clouds[a];
+        let m = Motion::from(back[a]);
+        let untaken = |i: &usize| evidence.spaces[a].bits(cloud.points[*i]) & TAKEN == 0;
+        let targets = (0..cloud.points.len())
+            .filter(untaken)
+            .map(|i| (m.apply(cloud.points[i]), m.rot * cloud.normals[i]))
+            .collect();
+        let duel = Duel { source, targets, space: &evidence.spaces[a], place: Motion::from(place[a]) };
+        let hypotheses = duel.propose(ALIGNED, seed ^ ((k as u64 + 1) << 8));
+        let aligned = align(evidence, &duel, &hypotheses, a, place, &back, (ASKED / pairs.len()).max(4));
+        let asked: Vec<Proposal> = aligned
+            .into_par_iter()
+            .map(|(h, crowd)| {
+                let mut rng = fastrand::Rng::with_seed(seed);
+                let mut crowd = crowd;
+                rng.shuffle(&mut crowd);
+                crowd.truncate(CROWD);
+                let extent = (evidence.lattice.size.as_vec3() * evidence.lattice.voxel).max_element();
+                let range = whole_range(&h.screw, extent);
+                let found = scan(evidence, &crowd, place, &h.screw, range, 1.5 * evidence.lattice.voxel);
+                let own: Vec<Pose> = (0..n).map(|s| place[s] * h.screw.motion(found.values[s])).collect();
+                let gain = jury.gain(evidence, &own, false);
+                Proposal { parent, source: b, screw: h.screw, scan: found, gain, crowd }
+            })
+            .collect();
+        all.extend(asked);
+    }
+    all
+}
+
+/// The first pairs of a sorted list, at most two from one source state and two to one target.
+fn varied(pairs: &[usize], n: usize) -> Vec<usize> {
+    let (mut from, mut to) = (vec![0; n], vec![0; n]);
+    let mut out = Vec::new();
+    for &k in pairs {
+        if from[k / n] < 2 && to[k % n] < 2 {
+            from[k / n] += 1;
+            to[k % n] += 1;
+            out.push(k);
+            if out.len() == PAIRS {
+                break;
+            }
+        }
+    }
+    out
+}
+
+/// Aligns hypotheses by ICP and answers, of the best that differ, hinge and slide with the samples that fit.
+fn align(
+    evidence: &Evidence,
+    duel: &Duel,
+    hypotheses: &[Hypothesis],
+    a: usize,
+    place: &[Pose],
+    back: &[Pose],
+    keep: usize,
+) -> Vec<(Hypothesis, Vec<Sample>)> {
+    let voxel = evidence.lattice.voxel as f64;
+    let gates = [3.0, 2.5, 2.0, 1.5, 1.5, 1.0, 1.0, 1.0].map(|g| g * voxel);
+    let mut all: Vec<(Hypothesis, Pose)> = hypotheses
+        .par_iter()
+        .filter_map(|h| {
+            let start = h.screw.motion(h.q);
+            let near = duel.fitting(&start.into(), 1);
+            if near.len() < FEW {
+                return None;
+            }
+            let (pose, _) = icp::align(&points(&near), &normals(&near), &evidence.clouds[a], place[a] * start, &gates);
+            let pose = back[a] * pose;
+            let score = duel.fitting(&pose.into(), 0).len();
+            Some((Hypothesis { score, ..*h }, pose))
+        })
+        .collect();
+    all.sort_by(|x, y| y.0.score.cmp(&x.0.score));
+    let extent = points(&duel.source);
+    let mut out = Vec::new();
+    let mut kept: Vec<Hypothesis> = Vec::new();
+    for (h, pose) in all {
+        let crowd = duel.fitting(&pose.into(), 0);
+        if crowd.len() < FEW {
+            continue;
+        }
+        for kind in [JointKind::Revolute, JointKind::Prismatic] {
+            let Some((screw, q)) = nearest_screw(&pose, kind, centroid(&crowd)) else { continue };
+            let new = Hypothesis { screw, q, score: h.score };
+            let with: Vec<Hypothesis> = kept.iter().copied().chain([new]).collect();
+            if distinct(with, &extent, 2.0 * voxel as f32, usize::MAX).len() > kept.len() {
+                kept.push(new);
+                out.push((new, crowd.clone()));
+            }
+        }
+        if out.len() >= 2 * keep {
+            break;
+        }
+    }
+    out
+}
+
+fn normals(samples: &[Sample]) -> Vec<glam::Vec3> {
+    samples.iter().map(|s| s.normal).collect()
+}
+
