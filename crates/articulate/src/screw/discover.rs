@@ -6,7 +6,7 @@
 //! Gauss-Newton, and the one that removes the most contradictions, measured within the noise, becomes a part.
 
 use super::adopt::adopt;
-use super::evidence::{Evidence, Motion, Verdict};
+use super::evidence::{Evidence, Motion, Sample, Verdict};
 use super::jury::Jury;
 use super::propose::{Proposal, propose};
 use hingecast_geom::{Cancelled, JointKind, KinematicTree, Pose, Progress};
@@ -50,13 +50,13 @@ pub fn discover(
         let proposals: Vec<Proposal> = (0..tree.parts.len())
             .flat_map(|p| propose(evidence, p, &poses[p], &open, &verdicts, &jury, seed))
             .collect();
-        let finals: Vec<(f64, KinematicTree)> = finalists(evidence, proposals, &poses)
+        let finals: Vec<(f64, KinematicTree)> = finalists(evidence, proposals)
             .par_iter()
             .map(|p| {
                 let mut tree = tree.clone();
                 adopt(evidence, &mut tree, p, seed);
                 let own = poses_of(&tree, tree.parts.len() - 1, n_states);
-                (jury.gain(evidence, &own, true) * plausibility(&tree), tree)
+                (jury.gain(evidence, &own, true) * plausibility(&tree, &p.crowd), tree)
             })
             .collect();
         if std::env::var_os("PROBE").is_some() {
@@ -95,20 +95,24 @@ fn open_samples(verdicts: &[Vec<Verdict>]) -> Vec<usize> {
 }
 
 /// The best proposals that differ.
-fn finalists(evidence: &Evidence, mut all: Vec<Proposal>, parents: &[Vec<Pose>]) -> Vec<Proposal> {
+fn finalists(evidence: &Evidence, mut all: Vec<Proposal>) -> Vec<Proposal> {
     all.sort_by(|a, b| b.gain.total_cmp(&a.gain));
+    // In the parent's frame: where the proposal has its samples in state s, and where another would take them from
+    // where the first state has them.
+    let own = |p: &Proposal, s: usize| Motion::from(p.screw.motion(p.scan.values[s]));
+    let other = |o: &Proposal, p: &Proposal, s: usize| {
+        let (v, first) = (&o.scan.values, p.scan.values[0]);
+        Motion::from(o.screw.motion(v[s] - v[0]) * p.screw.motion(first))
+    };
     let mut out: Vec<Proposal> = Vec::new();
     for p in all {
-        let motion = |o: &Proposal, s: usize| Motion::from(parents[o.parent][s] * o.screw.motion(o.scan.values[s]));
         let same = |o: &Proposal| {
             o.screw.kind == p.screw.kind
                 && o.parent == p.parent
-                && o.source == p.source
-                && (0..parents[0].len()).all(|s| {
-                    let (a, b) = (motion(o, s), motion(&p, s));
-                    p.crowd.iter().step_by(8).all(|x| {
-                        a.apply(x.point).distance(b.apply(x.point)) < 3.0 * evidence.lattice.voxel
-                    })
+                && (0..p.scan.values.len()).all(|s| {
+                    let (a, b) = (own(&p, s), other(o, &p, s));
+                    let apart = |x: &Sample| a.apply(x.point).distance(b.apply(x.point));
+                    p.crowd.iter().step_by(8).all(|x| apart(x) < 3.0 * evidence.lattice.voxel)
                 })
         };
         if !out.iter().any(same) {
@@ -121,12 +125,23 @@ fn finalists(evidence: &Evidence, mut all: Vec<Proposal>, parents: &[Vec<Pose>])
     out
 }
 
-/// Among equally good explanations: no chain without need, no hinge where a slide does, no great turn.
-fn plausibility(tree: &KinematicTree) -> f64 {
+/// Among equally good explanations: no chain without need, no hinge where a slide does, no great turn, and an axis that
+/// lies along the part's faces or square to them, as in nearly everything that people build.
+fn plausibility(tree: &KinematicTree, crowd: &[Sample]) -> f64 {
     let joint = tree.joints.last().expect("a part was added");
     let (lo, hi) = joint.values.iter().fold((0.0, 0.0), |(lo, hi), v| (f64::min(lo, *v), f64::max(hi, *v)));
     let chain = if joint.parent == 0 { 1.05 } else { 1.0 };
     let kind = if joint.screw.kind == JointKind::Prismatic { 1.02 } else { 1.0 };
     let turn = if joint.screw.kind.turns() { 1.0 - 0.05 * ((hi - lo) / std::f64::consts::PI).min(1.0) } else { 1.0 };
-    chain * kind * turn
+    // The crowd stands where the source state has it: in the parent's frame, where the axis is.
+    let aligned = |s: &Sample| {
+        let along = joint.screw.axis.dot(s.normal.as_dvec3()).abs().min(1.0);
+        let off = along.asin().min(along.acos()) / ALONG_FACES;
+        (-off * off).exp()
+    };
+    let faces = crowd.iter().map(aligned).sum::<f64>() / crowd.len().max(1) as f64;
+    chain * kind * turn * (1.0 + 0.08 * faces)
 }
+
+/// Angle between an axis and a face that counts as along it, radians.
+const ALONG_FACES: f64 = 0.03;

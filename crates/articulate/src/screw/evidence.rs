@@ -40,6 +40,8 @@ pub struct Sample {
 pub struct Verdict {
     pub against: u64,
     pub support: u64,
+    /// Support by surface that no known part explained when the question was asked.
+    pub fresh: u64,
 }
 
 /// Most states that witness at once (bits of a [`Verdict`]).
@@ -152,7 +154,11 @@ impl Evidence {
         for (t, m) in from.iter().enumerate().filter(|(t, _)| *t != s.state) {
             match self.spaces[t].ask(m.apply(s.point), m.rot * s.normal) {
                 Answer::Free => v.against |= 1 << t,
-                Answer::Surface => v.support |= 1 << t,
+                Answer::Surface => {
+                    v.support |= 1 << t;
+                    v.fresh |= 1 << t;
+                }
+                Answer::Taken => v.support |= 1 << t,
                 Answer::Silent => {}
             }
         }

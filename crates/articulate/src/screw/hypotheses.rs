@@ -28,6 +28,8 @@ pub struct Hypothesis {
 pub struct Duel<'a> {
     pub source: Vec<Sample>,
     pub targets: Vec<(Vec3, Vec3)>,
+    /// The moving samples of the target state, in the parent's canonical frame.
+    pub reverse: Vec<Sample>,
     pub space: &'a Space,
     /// World at the target state from the parent's canonical frame.
     pub place: Motion,

@@ -38,13 +38,13 @@ impl Jury {
         let each = |(s, fewest): &(Sample, u32)| {
             let v = evidence.ask_all(s, &between[s.state]);
             let removed = fewest.saturating_sub(v.against.count_ones()) as f64;
-            if removed == 0.0 || v.support == 0 {
+            if removed == 0.0 || v.fresh == 0 {
                 return removed * UNSEEN;
             }
             if !tight {
                 return removed;
             }
-            removed * (LOOSE + (1.0 - LOOSE) * closeness(evidence, s, &between[s.state], v.support))
+            removed * (LOOSE + (1.0 - LOOSE) * closeness(evidence, s, &between[s.state], v.fresh))
         };
         // Summed in a fixed order.
         self.members.par_iter().map(each).collect::<Vec<f64>>().iter().sum::<f64>() * self.weight
@@ -52,8 +52,8 @@ impl Jury {
 }
 
 /// Share of some supporting states in which the sample meets the surface within the noise.
-fn closeness(evidence: &Evidence, s: &Sample, between: &[Motion], support: u64) -> f64 {
-    let states: Vec<usize> = (0..between.len()).filter(|t| support >> t & 1 == 1).collect();
+fn closeness(evidence: &Evidence, s: &Sample, between: &[Motion], fresh: u64) -> f64 {
+    let states: Vec<usize> = (0..between.len()).filter(|t| fresh >> t & 1 == 1).collect();
     let stride = states.len().div_ceil(MEASURED).max(1);
     let (mut met, mut asked) = (0, 0);
     for &t in states.iter().step_by(stride) {

@@ -12,7 +12,9 @@ use rayon::prelude::*;
 /// Pairs of states per parent and round.
 const PAIRS: usize = 6;
 /// Hypotheses per pair that are aligned.
-const ALIGNED: usize = 60;
+const ALIGNED: usize = 180;
+/// Samples that align and judge a hypothesis.
+const JURY: usize = 400;
 /// Poses per parent that are asked in all states, each as a hinge and as a slide.
 const ASKED: usize = 36;
 /// Samples that ask.
@@ -62,11 +64,12 @@ pub fn propose(
             point: Motion::from(back[s.state]).apply(s.point),
             normal: Motion::from(back[s.state]).rot * s.normal,
         };
-        let source: Vec<Sample> = open
-            .iter()
-            .filter(|&&i| evidence.samples[i].state == b && verdict[i].against >> a & 1 == 1)
-            .map(|&i| into(&evidence.samples[i]))
-            .collect();
+        // Open samples of one state that the parent's motion would put into emptiness of the other.
+        let moving = |from: usize, to: usize| -> Vec<Sample> {
+            let own = |i: &&usize| evidence.samples[**i].state == from && verdict[**i].against >> to & 1 == 1;
+            open.iter().filter(own).map(|&i| into(&evidence.samples[i])).collect()
+        };
+        let (source, reverse) = (moving(b, a), moving(a, b));
         let cloud = &evidence.clouds[a];
         let m = Motion::from(back[a]);
         let untaken = |i: &usize| evidence.spaces[a].bits(cloud.points[*i]) & TAKEN == 0;
@@ -74,9 +77,10 @@ pub fn propose(
             .filter(untaken)
             .map(|i| (m.apply(cloud.points[i]), m.rot * cloud.normals[i]))
             .collect();
-        let duel = Duel { source, targets, space: &evidence.spaces[a], place: Motion::from(place[a]) };
-        let hypotheses = duel.propose(ALIGNED, seed ^ ((k as u64 + 1) << 8));
-        let aligned = align(evidence, &duel, &hypotheses, a, place, &back, (ASKED / pairs.len()).max(4));
+        let duel = Duel { source, targets, reverse, space: &evidence.spaces[a], place: Motion::from(place[a]) };
+        let hypotheses = duel.propose(ALIGNED / pairs.len().min(3), seed ^ ((k as u64 + 1) << 8));
+        let keep = (ASKED / pairs.len()).max(4);
+        let aligned = align(evidence, &duel, &hypotheses, [b, a], place, &back, keep, seed);
         let asked: Vec<Proposal> = aligned
             .into_par_iter()
             .map(|(h, crowd)| {
@@ -119,29 +123,45 @@ fn align(
     evidence: &Evidence,
     duel: &Duel,
     hypotheses: &[Hypothesis],
-    a: usize,
+    [b, a]: [usize; 2],
     place: &[Pose],
     back: &[Pose],
     keep: usize,
+    seed: u64,
 ) -> Vec<(Hypothesis, Vec<Sample>)> {
     let voxel = evidence.lattice.voxel as f64;
     let gates = [3.0, 2.5, 2.0, 1.5, 1.5, 1.0, 1.0, 1.0].map(|g| g * voxel);
+    let some = |samples: Vec<Sample>, most: usize| {
+        let mut samples = samples;
+        fastrand::Rng::with_seed(seed).shuffle(&mut samples);
+        samples.truncate(most);
+        samples
+    };
+    let (jury, reverse) = (some(duel.source.clone(), JURY), some(duel.reverse.clone(), JURY));
+    // Met within the noise, where nothing known is.
+    let met = |samples: &[Sample], m: Motion, t: usize| {
+        let meets = |s: &&Sample| {
+            let x = m.apply(s.point);
+            evidence.spaces[t].bits(x) & TAKEN == 0 && evidence.meets(t, x, m.rot * s.normal)
+        };
+        samples.iter().filter(meets).count()
+    };
     let mut all: Vec<(Hypothesis, Pose)> = hypotheses
         .par_iter()
         .filter_map(|h| {
             let start = h.screw.motion(h.q);
-            let near = duel.fitting(&start.into(), 1);
+            let near = some(duel.fitting(&start.into(), 1), JURY);
             if near.len() < FEW {
                 return None;
             }
             let (pose, _) = icp::align(&points(&near), &normals(&near), &evidence.clouds[a], place[a] * start, &gates);
-            let pose = back[a] * pose;
-            let score = duel.fitting(&pose.into(), 0).len();
-            Some((Hypothesis { score, ..*h }, pose))
+            let score = met(&jury, pose.into(), a) * duel.source.len() / jury.len().max(1)
+                + met(&reverse, (place[b] * pose.inverse()).into(), b) * duel.reverse.len() / reverse.len().max(1);
+            Some((Hypothesis { score, ..*h }, back[a] * pose))
         })
         .collect();
     all.sort_by(|x, y| y.0.score.cmp(&x.0.score));
-    let extent = points(&duel.source);
+    let extent = points(&jury);
     let mut out = Vec::new();
     let mut kept: Vec<Hypothesis> = Vec::new();
     for (h, pose) in all {

@@ -51,8 +51,10 @@ impl Lattice {
 /// What a state says about a place, asked with the normal that a surface there would have.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Answer {
-    /// A surface that faces the same way was measured here.
+    /// A surface that faces the same way was measured here, and no known part explains it.
     Surface,
+    /// The same, but a known part explains it.
+    Taken,
     /// Cameras looked through this place.
     Free,
     /// Nobody saw, or another surface is here.
@@ -157,7 +159,7 @@ impl Space {
         let Some(i) = self.lattice.index(x) else { return Answer::Free };
         let cell = self.cells[i];
         if cell & facing_bit(n) != 0 {
-            Answer::Surface
+            if cell & TAKEN == 0 { Answer::Surface } else { Answer::Taken }
         } else if cell & FREE != 0 {
             Answer::Free
         } else {
