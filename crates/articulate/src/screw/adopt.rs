@@ -67,8 +67,7 @@ fn rescan(evidence: &Evidence, tree: &mut KinematicTree, members: &[Sample], pla
             Sample { state: s.state, point: m.apply(s.point), normal: m.rot * s.normal }
         })
         .collect();
-    let extent = (evidence.lattice.size.as_vec3() * evidence.lattice.voxel).max_element();
-    let range = whole_range(&joint.screw, extent);
+        let range = whole_range(&joint.screw, evidence.extent());
     let mut found = scan(evidence, &samples, place, &joint.screw, range, 1.0 * evidence.lattice.voxel);
     for (s, parent) in place.iter().enumerate() {
         let held = agreement(evidence, s, &samples, &Motion::from(*parent * joint.screw.motion(joint.values[s])));

@@ -8,8 +8,9 @@
 use super::adopt::adopt;
 use super::evidence::{Evidence, Motion, Sample, Verdict};
 use super::jury::Jury;
+use super::plausible::plausibility;
 use super::propose::{Proposal, propose};
-use hingecast_geom::{Cancelled, JointKind, KinematicTree, Pose, Progress};
+use hingecast_geom::{Cancelled, KinematicTree, Pose, Progress};
 use rayon::prelude::*;
 
 /// What was found, before labels are settled.
@@ -22,10 +23,26 @@ pub struct Discovery {
 }
 
 /// Proposals that are refined before one is chosen.
-const FINALISTS: usize = 10;
+const FINALISTS: usize = 12;
 /// A part has at least this share of all samples, and this many.
 const LEAST_SHARE: f64 = 0.002;
 const LEAST: usize = 25;
+
+/// With few states a wrong motion can look best for the first part and leave the others in pieces, so this many
+/// alternatives are followed.
+const BEAM: usize = 4;
+/// States from which on the first choice has always been right.
+const MANY_STATES: usize = 4;
+
+/// A set of parts under construction.
+struct Node {
+    tree: KinematicTree,
+    verdicts: Vec<Vec<Verdict>>,
+    /// Samples that every part contradicts.
+    open: Vec<usize>,
+    /// Contradictions removed so far, by tight count, times plausibility.
+    merit: f64,
+}
 
 pub fn discover(
     evidence: &mut Evidence,
@@ -34,54 +51,86 @@ pub fn discover(
     progress: &Progress,
 ) -> Result<Discovery, Cancelled> {
     let n_states = evidence.n_states();
-    let mut tree = KinematicTree { parts: vec!["base".to_string()], joints: Vec::new() };
-    let mut verdicts = vec![evidence.judge(&vec![Pose::IDENTITY; n_states])];
-    let least = ((LEAST_SHARE * evidence.samples.len() as f64) as usize).max(LEAST);
-    let mut open;
-    loop {
-        progress.report(tree.parts.len() - 1, max_parts.min(tree.parts.len() + 1), "looking for parts")?;
-        let poses: Vec<Vec<Pose>> = (0..tree.parts.len()).map(|p| poses_of(&tree, p, n_states)).collect();
-        evidence.mark_taken(&poses);
-        open = open_samples(&verdicts);
-        if open.len() < least || tree.parts.len() >= max_parts {
-            break;
-        }
-        let jury = Jury::new(evidence, &open, &verdicts, seed);
-        let proposals: Vec<Proposal> = (0..tree.parts.len())
-            .flat_map(|p| propose(evidence, p, &poses[p], &open, &verdicts, &jury, seed))
-            .collect();
-        let finals: Vec<(f64, KinematicTree)> = finalists(evidence, proposals)
-            .par_iter()
-            .map(|p| {
-                let mut tree = tree.clone();
-                adopt(evidence, &mut tree, p, seed);
-                let own = poses_of(&tree, tree.parts.len() - 1, n_states);
-                (jury.gain(evidence, &own, true) * plausibility(&tree, &p.crowd), tree)
-            })
-            .collect();
-        if std::env::var_os("PROBE").is_some() {
-            eprintln!("  open {} of {}", open.len(), evidence.samples.len());
-            for (g, t) in &finals {
-                let j = t.joints.last().unwrap();
-                eprintln!("    {g:.0} on {} {:?} {:.3} at {:.3} {:.2?}", j.parent, j.screw.kind, j.screw.axis, j.screw.pivot, j.values);
+    let verdicts = vec![evidence.judge(&vec![Pose::IDENTITY; n_states])];
+    let tree = KinematicTree { parts: vec!["base".to_string()], joints: Vec::new() };
+    let open = open_samples(&verdicts);
+    let mut front = vec![Node { tree, verdicts, open, merit: 0.0 }];
+    let mut best: Option<Node> = None;
+    let width = if n_states < MANY_STATES { BEAM } else { 1 };
+    for round in 0..max_parts {
+        progress.report(round, max_parts, &format!("{} parts", round + 1))?;
+        let mut next: Vec<Node> = Vec::new();
+        for node in front {
+            let grown = grow(evidence, &node, width, seed);
+            progress.check()?;
+            next.extend(grown);
+            if best.as_ref().is_none_or(|b| node.merit > b.merit) {
+                best = Some(node);
             }
         }
-        // The first of equals: finalists are sorted.
-        let Some((_, with)) = finals.into_iter().rev().max_by(|a, b| a.0.total_cmp(&b.0)) else { break };
-        let own = poses_of(&with, with.parts.len() - 1, n_states);
-        let verdict = evidence.judge(&own);
-        let explained = open.iter().filter(|&&i| verdict[i].against == 0 && verdict[i].support != 0).count();
-        if std::env::var_os("PROBE").is_some() {
-            let j = with.joints.last().unwrap();
-            eprintln!("  explains {explained}; {} {:?} {:.3?}", j.parent, j.screw, j.values);
-        }
-        if explained < least {
+        next.sort_by(|a, b| b.merit.total_cmp(&a.merit));
+        next.dedup_by(|b, a| (a.merit - b.merit).abs() < 0.005 * a.merit && a.open.len().abs_diff(b.open.len()) < LEAST);
+        next.truncate(width);
+        front = next;
+        if front.is_empty() {
             break;
         }
-        tree = with;
-        verdicts.push(verdict);
     }
-    Ok(Discovery { tree, verdicts, unexplained: open.len() as f64 / evidence.samples.len().max(1) as f64 })
+    let best = front.into_iter().chain(best).max_by(|a, b| a.merit.total_cmp(&b.merit)).expect("the first node");
+    let unexplained = best.open.len() as f64 / evidence.samples.len().max(1) as f64;
+    Ok(Discovery { tree: best.tree, verdicts: best.verdicts, unexplained })
+}
+
+/// The `width` best ways to add a part.
+fn grow(evidence: &mut Evidence, node: &Node, width: usize, seed: u64) -> Vec<Node> {
+    let n_states = evidence.n_states();
+    let least = ((LEAST_SHARE * evidence.samples.len() as f64) as usize).max(LEAST);
+    if node.open.len() < least {
+        return Vec::new();
+    }
+    let poses: Vec<Vec<Pose>> = (0..node.tree.parts.len()).map(|p| poses_of(&node.tree, p, n_states)).collect();
+    evidence.mark_taken(&poses);
+    let evidence = &*evidence;
+    let jury = Jury::new(evidence, &node.open, &node.verdicts, seed);
+    let proposals: Vec<Proposal> = (0..node.tree.parts.len())
+        .flat_map(|p| propose(evidence, p, &poses[p], &node.open, &node.verdicts, &jury, seed))
+        .collect();
+    let mut finals: Vec<(f64, KinematicTree)> = finalists(evidence, proposals)
+        .par_iter()
+        .map(|p| {
+            let mut tree = node.tree.clone();
+            adopt(evidence, &mut tree, p, seed);
+            let own = poses_of(&tree, tree.parts.len() - 1, n_states);
+            let joint = tree.joints.last().expect("a part was added");
+            let weight = plausibility(&joint.screw, &joint.values, joint.parent, &p.crowd, evidence.extent());
+            (jury.gain(evidence, &own, true) * weight, tree)
+        })
+        .collect();
+    finals.sort_by(|a, b| b.0.total_cmp(&a.0));
+    if std::env::var_os("PROBE").is_some() {
+        eprintln!("  open {} of {} merit {:.0}", node.open.len(), evidence.samples.len(), node.merit);
+        for (g, t) in &finals {
+            let j = t.joints.last().unwrap();
+            eprintln!("    {g:.0} on {} {:?} {:.3} at {:.3} {:.2?}", j.parent, j.screw.kind, j.screw.axis, j.screw.pivot, j.values);
+        }
+    }
+    finals
+        .into_iter()
+        .take(2 * width)
+        .filter_map(|(merit, tree)| {
+            let own = poses_of(&tree, tree.parts.len() - 1, n_states);
+            let verdict = evidence.judge(&own);
+            let explained = node.open.iter().filter(|&&i| verdict[i].against == 0 && verdict[i].support != 0).count();
+            if explained < least {
+                return None;
+            }
+            let mut verdicts = node.verdicts.clone();
+            verdicts.push(verdict);
+            let open = open_samples(&verdicts);
+            Some(Node { tree, verdicts, open, merit: node.merit + merit })
+        })
+        .take(width)
+        .collect()
 }
 
 /// World from canonical of a part in every state.
@@ -96,7 +145,8 @@ fn open_samples(verdicts: &[Vec<Verdict>]) -> Vec<usize> {
 
 /// The best proposals that differ.
 fn finalists(evidence: &Evidence, mut all: Vec<Proposal>) -> Vec<Proposal> {
-    all.sort_by(|a, b| b.gain.total_cmp(&a.gain));
+    let merit = |p: &Proposal| p.gain * plausibility(&p.screw, &p.scan.values, p.parent, &p.crowd, evidence.extent());
+    all.sort_by(|a, b| merit(b).total_cmp(&merit(a)));
     // In the parent's frame: where the proposal has its samples in state s, and where another would take them from
     // where the first state has them.
     let own = |p: &Proposal, s: usize| Motion::from(p.screw.motion(p.scan.values[s]));
@@ -112,7 +162,7 @@ fn finalists(evidence: &Evidence, mut all: Vec<Proposal>) -> Vec<Proposal> {
                 && (0..p.scan.values.len()).all(|s| {
                     let (a, b) = (own(&p, s), other(o, &p, s));
                     let apart = |x: &Sample| a.apply(x.point).distance(b.apply(x.point));
-                    p.crowd.iter().step_by(8).all(|x| apart(x) < 3.0 * evidence.lattice.voxel)
+                    p.crowd.iter().step_by(8).all(|x| apart(x) < 8.0 * evidence.lattice.voxel)
                 })
         };
         if !out.iter().any(same) {
@@ -124,24 +174,3 @@ fn finalists(evidence: &Evidence, mut all: Vec<Proposal>) -> Vec<Proposal> {
     }
     out
 }
-
-/// Among equally good explanations: no chain without need, no hinge where a slide does, no great turn, and an axis that
-/// lies along the part's faces or square to them, as in nearly everything that people build.
-fn plausibility(tree: &KinematicTree, crowd: &[Sample]) -> f64 {
-    let joint = tree.joints.last().expect("a part was added");
-    let (lo, hi) = joint.values.iter().fold((0.0, 0.0), |(lo, hi), v| (f64::min(lo, *v), f64::max(hi, *v)));
-    let chain = if joint.parent == 0 { 1.05 } else { 1.0 };
-    let kind = if joint.screw.kind == JointKind::Prismatic { 1.02 } else { 1.0 };
-    let turn = if joint.screw.kind.turns() { 1.0 - 0.05 * ((hi - lo) / std::f64::consts::PI).min(1.0) } else { 1.0 };
-    // The crowd stands where the source state has it: in the parent's frame, where the axis is.
-    let aligned = |s: &Sample| {
-        let along = joint.screw.axis.dot(s.normal.as_dvec3()).abs().min(1.0);
-        let off = along.asin().min(along.acos()) / ALONG_FACES;
-        (-off * off).exp()
-    };
-    let faces = crowd.iter().map(aligned).sum::<f64>() / crowd.len().max(1) as f64;
-    chain * kind * turn * (1.0 + 0.08 * faces)
-}
-
-/// Angle between an axis and a face that counts as along it, radians.
-const ALONG_FACES: f64 = 0.03;

@@ -102,6 +102,11 @@ impl Evidence {
         Ok(evidence)
     }
 
+    /// Longest side of the space that the object takes in all states, scene units.
+    pub fn extent(&self) -> f32 {
+        (self.lattice.size.as_vec3() * self.lattice.voxel).max_element()
+    }
+
     pub fn n_states(&self) -> usize {
         self.spaces.len()
     }

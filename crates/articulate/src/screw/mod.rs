@@ -5,6 +5,7 @@ pub mod discover;
 pub mod evidence;
 pub mod hypotheses;
 pub mod jury;
+pub mod plausible;
 pub mod propose;
 pub mod refine;
 pub mod scan;

@@ -3,6 +3,7 @@
 use super::evidence::{Evidence, Motion, Sample, Verdict};
 use super::hypotheses::{Duel, Hypothesis, distinct, nearest_screw};
 use super::jury::Jury;
+use super::plausible::plausibility;
 use super::scan::{Scan, centroid, points, scan, whole_range};
 use super::space::TAKEN;
 use crate::icp;
@@ -79,8 +80,8 @@ pub fn propose(
             .collect();
         let duel = Duel { source, targets, reverse, space: &evidence.spaces[a], place: Motion::from(place[a]) };
         let hypotheses = duel.propose(ALIGNED / pairs.len().min(3), seed ^ ((k as u64 + 1) << 8));
-        let keep = (ASKED / pairs.len()).max(4);
-        let aligned = align(evidence, &duel, &hypotheses, [b, a], place, &back, keep, seed);
+        let keep = (ASKED / pairs.len()).max(6);
+        let aligned = align(evidence, &duel, &hypotheses, [b, a], parent, place, &back, keep, seed);
         let asked: Vec<Proposal> = aligned
             .into_par_iter()
             .map(|(h, crowd)| {
@@ -88,8 +89,7 @@ pub fn propose(
                 let mut crowd = crowd;
                 rng.shuffle(&mut crowd);
                 crowd.truncate(CROWD);
-                let extent = (evidence.lattice.size.as_vec3() * evidence.lattice.voxel).max_element();
-                let range = whole_range(&h.screw, extent);
+                                let range = whole_range(&h.screw, evidence.extent());
                 let found = scan(evidence, &crowd, place, &h.screw, range, 1.5 * evidence.lattice.voxel);
                 let own: Vec<Pose> = (0..n).map(|s| place[s] * h.screw.motion(found.values[s])).collect();
                 let gain = jury.gain(evidence, &own, false);
@@ -124,6 +124,7 @@ fn align(
     duel: &Duel,
     hypotheses: &[Hypothesis],
     [b, a]: [usize; 2],
+    parent: usize,
     place: &[Pose],
     back: &[Pose],
     keep: usize,
@@ -161,9 +162,8 @@ fn align(
         })
         .collect();
     all.sort_by(|x, y| y.0.score.cmp(&x.0.score));
-    let extent = points(&jury);
-    let mut out = Vec::new();
-    let mut kept: Vec<Hypothesis> = Vec::new();
+    // Each pose as a hinge and as a slide, where that is what it is.
+    let mut screws: Vec<(f64, Hypothesis, Vec<Sample>)> = Vec::new();
     for (h, pose) in all {
         let crowd = duel.fitting(&pose.into(), 0);
         if crowd.len() < FEW {
@@ -171,15 +171,27 @@ fn align(
         }
         for kind in [JointKind::Revolute, JointKind::Prismatic] {
             let Some((screw, q)) = nearest_screw(&pose, kind, centroid(&crowd)) else { continue };
-            let new = Hypothesis { screw, q, score: h.score };
-            let with: Vec<Hypothesis> = kept.iter().copied().chain([new]).collect();
-            if distinct(with, &extent, 2.0 * voxel as f32, usize::MAX).len() > kept.len() {
-                kept.push(new);
-                out.push((new, crowd.clone()));
+            let (exact, near) = (Motion::from(pose), Motion::from(screw.motion(q)));
+            let off = |s: &Sample| exact.apply(s.point).distance(near.apply(s.point)) > 3.0 * evidence.lattice.voxel;
+            if 2 * crowd.iter().filter(|s| off(s)).count() > crowd.len() {
+                continue;
             }
+            let merit = h.score as f64 * plausibility(&screw, &[0.0, q], parent, &crowd, evidence.extent());
+            screws.push((merit, Hypothesis { screw, q, score: h.score }, crowd.clone()));
         }
-        if out.len() >= 2 * keep {
-            break;
+    }
+    screws.sort_by(|a, b| b.0.total_cmp(&a.0));
+    let extent = points(&jury);
+    let mut kept: Vec<Hypothesis> = Vec::new();
+    let mut out = Vec::new();
+    for (_, h, crowd) in screws {
+        let with: Vec<Hypothesis> = kept.iter().copied().chain([h]).collect();
+        if distinct(with, &extent, 4.0 * voxel as f32, usize::MAX).len() > kept.len() {
+            kept.push(h);
+            out.push((h, crowd));
+            if out.len() >= keep {
+                break;
+            }
         }
     }
     out
