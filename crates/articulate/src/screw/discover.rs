@@ -34,6 +34,10 @@ const BEAM: usize = 4;
 /// States from which on the first choice has always been right.
 const MANY_STATES: usize = 4;
 
+/// What a part costs, share of all contradictions that a single rigid thing would have: its screw and its values have to be
+/// paid for by what they explain.
+const PART_COST: f64 = 0.015;
+
 /// A set of parts under construction.
 struct Node {
     tree: KinematicTree,
@@ -54,6 +58,7 @@ pub fn discover(
     let verdicts = vec![evidence.judge(&vec![Pose::IDENTITY; n_states])];
     let tree = KinematicTree { parts: vec!["base".to_string()], joints: Vec::new() };
     let open = open_samples(&verdicts);
+    let cost = PART_COST * verdicts[0].iter().map(|v| v.against.count_ones() as f64).sum::<f64>();
     let mut front = vec![Node { tree, verdicts, open, merit: 0.0 }];
     let mut best: Option<Node> = None;
     let width = if n_states < MANY_STATES { BEAM } else { 1 };
@@ -61,7 +66,7 @@ pub fn discover(
         progress.report(round, max_parts, &format!("{} parts", round + 1))?;
         let mut next: Vec<Node> = Vec::new();
         for node in front {
-            let grown = grow(evidence, &node, width, seed);
+            let grown = grow(evidence, &node, width, cost, seed);
             progress.check()?;
             next.extend(grown);
             if best.as_ref().is_none_or(|b| node.merit > b.merit) {
@@ -82,7 +87,7 @@ pub fn discover(
 }
 
 /// The `width` best ways to add a part.
-fn grow(evidence: &mut Evidence, node: &Node, width: usize, seed: u64) -> Vec<Node> {
+fn grow(evidence: &mut Evidence, node: &Node, width: usize, cost: f64, seed: u64) -> Vec<Node> {
     let n_states = evidence.n_states();
     let least = ((LEAST_SHARE * evidence.samples.len() as f64) as usize).max(LEAST);
     if node.open.len() < least {
@@ -103,7 +108,7 @@ fn grow(evidence: &mut Evidence, node: &Node, width: usize, seed: u64) -> Vec<No
             let own = poses_of(&tree, tree.parts.len() - 1, n_states);
             let joint = tree.joints.last().expect("a part was added");
             let weight = plausibility(&joint.screw, &joint.values, joint.parent, &p.crowd, evidence.extent());
-            (jury.gain(evidence, &own, true) * weight, tree)
+            (jury.gain(evidence, &own, true) * weight - cost, tree)
         })
         .collect();
     finals.sort_by(|a, b| b.0.total_cmp(&a.0));
@@ -121,7 +126,7 @@ fn grow(evidence: &mut Evidence, node: &Node, width: usize, seed: u64) -> Vec<No
             let own = poses_of(&tree, tree.parts.len() - 1, n_states);
             let verdict = evidence.judge(&own);
             let explained = node.open.iter().filter(|&&i| verdict[i].against == 0 && verdict[i].support != 0).count();
-            if explained < least {
+            if explained < least || merit <= 0.0 {
                 return None;
             }
             let mut verdicts = node.verdicts.clone();
