@@ -28,7 +28,7 @@ fn main() {
     }
     eprintln!("load {:.1}", t0.elapsed().as_secs_f64());
     let lattice = Lattice::new(lo, hi, 96);
-    let mut ev = Evidence::gather::<()>(rec.n_states, lattice, &mut |s| Ok(views_of(s)), 0).unwrap();
+    let mut ev = Evidence::gather::<()>(rec.n_states, lattice, &mut |s| { let mut v = views_of(s); let sp = hingecast_articulate::screw::cameras::align(&mut v, lattice.voxel); if s % 8 == 0 { eprintln!("spread {:?} voxel {}", sp, lattice.voxel); } if s == 0 { let truth = Truth::open(&Truth::folder_of(&path)).unwrap(); let fr = rec.frames_of(0, Split::Train); let (mut a, mut b) = (0.0, 0.0); for (k, &f) in fr.iter().enumerate() { let t = truth.cameras[f].camera_from_world; a += (rec.frames[f].camera.camera_from_world * t.inverse()).angle().to_degrees(); b += (v[k].camera.camera_from_world * t.inverse()).angle().to_degrees(); } eprintln!("camera deg before {:.3} after {:.3}", a / fr.len() as f64, b / fr.len() as f64); } Ok(v) }, 0).unwrap();
     eprintln!("evidence {:.1}  samples {} clouds {:?} voxel {}", t0.elapsed().as_secs_f64(), ev.samples.len(), ev.clouds.iter().map(|c| c.points.len()).take(3).collect::<Vec<_>>(), lattice.voxel);
     if std::env::var_os("TRUTHGAIN").is_some() {
         use hingecast_articulate::screw::jury::Jury;

@@ -7,7 +7,7 @@
 use glam::{DVec3, IVec3, Vec3};
 use hingecast_geom::Camera;
 use rayon::prelude::*;
-use std::collections::BTreeMap;
+use std::collections::HashMap;
 
 /// Pixel classes of a [`DepthView`].
 pub const BACKGROUND: u8 = 0;
@@ -65,7 +65,7 @@ impl DepthView {
     }
 
     /// Calls `emit(point, normal)` in the world frame for every `stride`-th pixel with a plane.
-    fn planes(&self, stride: usize, emit: &mut dyn FnMut(Vec3, Vec3)) {
+    pub fn planes(&self, stride: usize, emit: &mut dyn FnMut(Vec3, Vec3)) {
         let (w, h, c) = (self.camera.width, self.camera.height, &self.camera);
         let world_from_camera = c.camera_from_world.inverse();
         let (rot, trans) = (world_from_camera.mat3().as_mat3(), world_from_camera.trans);
@@ -143,8 +143,6 @@ impl DepthView {
 /// Gathers the planes of all views of a state into one sample per voxel of edge `voxel` and facing (one of six).
 /// Samples that fewer than `least` pixels support are dropped as stray.
 pub fn gather(views: &[DepthView], voxel: f32, stride: usize, least: u32) -> Cloud {
-    type Key = ([i32; 3], u8);
-    let mut cells: BTreeMap<Key, (DVec3, DVec3, u32)> = BTreeMap::new();
     let planes: Vec<Vec<(Vec3, Vec3)>> = views
         .par_iter()
         .map(|view| {
@@ -153,15 +151,25 @@ pub fn gather(views: &[DepthView], voxel: f32, stride: usize, least: u32) -> Clo
             out
         })
         .collect();
-    for (x, n) in planes.into_iter().flatten() {
+    merge(planes.into_iter().flatten(), voxel, least)
+}
+
+/// One sample per voxel and facing from oriented points, see [`gather`].
+pub fn merge(planes: impl Iterator<Item = (Vec3, Vec3)>, voxel: f32, least: u32) -> Cloud {
+    type Key = ([i32; 3], u8);
+    let mut cells: HashMap<Key, (DVec3, DVec3, u32)> = HashMap::new();
+    for (x, n) in planes {
         let key: IVec3 = (x / voxel).floor().as_ivec3();
         let slot = cells.entry((key.to_array(), facing(n))).or_insert((DVec3::ZERO, DVec3::ZERO, 0));
         slot.0 += x.as_dvec3();
         slot.1 += n.as_dvec3();
         slot.2 += 1;
     }
+    // The table's order is not the same in every run.
+    let mut cells: Vec<_> = cells.into_iter().collect();
+    cells.sort_unstable_by_key(|c| c.0);
     let mut cloud = Cloud::default();
-    for (x, n, count) in cells.into_values() {
+    for (_, (x, n, count)) in cells {
         let mean = n / count as f64;
         // Normals that disagree within a voxel make a sample that faces nowhere.
         if count >= least && mean.length() > 0.7 {

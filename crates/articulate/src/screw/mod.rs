@@ -1,5 +1,6 @@
 //! Parts and joints from all states' depth at once (`--method screw`).
 pub mod adopt;
+pub mod cameras;
 pub mod cloud;
 pub mod discover;
 pub mod evidence;

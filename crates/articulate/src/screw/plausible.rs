@@ -7,7 +7,7 @@ use super::evidence::Sample;
 use hingecast_geom::{JointKind, Screw};
 
 /// A part that hangs on the base, not on another moving part.
-const ON_BASE: f64 = 0.05;
+const ON_BASE: f64 = 0.15;
 /// A slide where a hinge far away would do.
 const SLIDE: f64 = 0.02;
 /// A turn by half a circle loses this.

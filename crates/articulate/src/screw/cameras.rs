@@ -1,0 +1,112 @@
+//! Camera poses that tracking left half a degree off, corrected by the depth that they measured together.
+//!
+//! Per state: every view's points are aligned to the surface that all views of the state agree on (point to plane), the
+//! surface is gathered anew, and so on. What all views have in common cannot be seen from within, so the mean
+//! correction is taken out again: errors of many cameras average out, errors of one do not.
+
+use super::cloud::{DepthView, merge};
+use crate::icp::{self, Surface};
+use glam::{DVec3, Vec3};
+use hingecast_geom::Pose;
+use hingecast_geom::pose::{quat_from_rotation_vector, rotation_vector};
+use rayon::prelude::*;
+
+/// Rounds of aligning and gathering.
+const ROUNDS: usize = 7;
+/// Points per view.
+const POINTS: usize = 1200;
+/// Fewer points hold no camera.
+const FEW: usize = 60;
+/// Below this share of a voxel the views agree already.
+const SHARP: f32 = 0.04;
+
+/// Corrects the cameras of one state's views in place. Answers the root mean square distance between the views' planes
+/// before and after, scene units.
+pub fn align(views: &mut [DepthView], voxel: f32) -> [f32; 2] {
+    let planes: Vec<Vec<(Vec3, Vec3)>> = views
+        .par_iter()
+        .map(|view| {
+            let pixels = view.class.iter().filter(|c| **c == super::cloud::OBJECT).count();
+            let stride = ((pixels as f64 / POINTS as f64).sqrt().round() as usize).max(1);
+            let mut out = Vec::new();
+            view.planes(stride, &mut |x, n| out.push((x, n)));
+            out
+        })
+        .collect();
+    let centre = mean_point(&planes);
+    // World as corrected from world as recorded.
+    let mut corrections = vec![Pose::IDENTITY; views.len()];
+    let mut spread = [0.0f32; 2];
+    for round in 0..ROUNDS {
+        let cloud = merge(
+            planes.iter().zip(&corrections).flat_map(|(p, c)| {
+                let (rot, trans) = (c.mat3().as_mat3(), c.trans.as_vec3());
+                p.iter().map(move |(x, n)| (rot * *x + trans, rot * *n))
+            }),
+            voxel,
+            2,
+        );
+        let surface = Surface::new(cloud.points, cloud.normals);
+        let wide = if round < 2 { 3.0 } else { 1.5 };
+        let gates = [wide, wide, 0.7 * wide].map(|g| g * voxel as f64);
+        let stepped: Vec<(Pose, f64)> = planes
+            .par_iter()
+            .zip(&corrections)
+            .map(|(p, c)| {
+                if p.len() < FEW {
+                    return (*c, 0.0);
+                }
+                let (points, normals): (Vec<Vec3>, Vec<Vec3>) = p.iter().copied().unzip();
+                let (pose, report) = icp::align(&points, &normals, &surface, *c, &gates);
+                if report.inliers < 0.3 { (*c, 0.0) } else { (pose, report.rms) }
+            })
+            .collect();
+        let rms = (stepped.iter().map(|s| s.1 * s.1).sum::<f64>() / stepped.len().max(1) as f64).sqrt() as f32;
+        if round == 0 {
+            let off = residual(&planes, &surface);
+            spread = [off, off];
+            if off < SHARP * voxel {
+                return spread;
+            }
+        }
+        spread[1] = rms;
+        corrections = without_mean(stepped.into_iter().map(|s| s.0).collect(), centre);
+    }
+    for (view, c) in views.iter_mut().zip(&corrections) {
+        view.camera.camera_from_world = view.camera.camera_from_world * c.inverse();
+    }
+    spread
+}
+
+fn mean_point(planes: &[Vec<(Vec3, Vec3)>]) -> DVec3 {
+    let all = planes.iter().flatten().fold((DVec3::ZERO, 0.0), |(sum, n), (x, _)| (sum + x.as_dvec3(), n + 1.0));
+    all.0 / f64::max(all.1, 1.0)
+}
+
+/// Median distance of the planes' points from the surface, as recorded.
+fn residual(planes: &[Vec<(Vec3, Vec3)>], surface: &Surface) -> f32 {
+    let mut off: Vec<f32> = planes
+        .par_iter()
+        .flat_map_iter(|p| p.iter().step_by(11))
+        .filter_map(|(x, n)| {
+            let (i, _) = surface.nearest(*x)?;
+            (surface.normals[i].dot(*n) > 0.8).then(|| surface.normals[i].dot(*x - surface.points[i]).abs())
+        })
+        .collect();
+    if off.is_empty() {
+        return 0.0;
+    }
+    let half = off.len() / 2;
+    *off.select_nth_unstable_by(half, f32::total_cmp).1 / 0.6745
+}
+
+/// Takes the mean rotation, and the mean shift of the object's centre, out of the corrections.
+fn without_mean(corrections: Vec<Pose>, centre: DVec3) -> Vec<Pose> {
+    let n = corrections.len() as f64;
+    let turn = corrections.iter().map(|c| rotation_vector(c.rot)).sum::<DVec3>() / n;
+    let shift = corrections.iter().map(|c| c.apply(centre) - centre).sum::<DVec3>() / n;
+    let rot = quat_from_rotation_vector(turn);
+    let mean = Pose::new(rot, centre + shift - rot * centre);
+    let back = mean.inverse();
+    corrections.into_iter().map(|c| back * c).collect()
+}
