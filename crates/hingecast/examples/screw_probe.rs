@@ -45,6 +45,9 @@ fn main() {
     }
     let d = discover(&mut ev, 12, 0, &Default::default()).unwrap();
     eprintln!("discover {:.1}  unexplained {:.4}", t0.elapsed().as_secs_f64(), d.unexplained);
+    let st = hingecast_articulate::screw::settle::settle(&mut ev, &d, 0);
+    eprintln!("settle {:.1} noise {} rms {} sigmas {:?}", t0.elapsed().as_secs_f64(), ev.tolerance, st.report.rms, st.report.sigmas);
+    let d = st;
     let truth = Truth::open(&Truth::folder_of(&path)).unwrap();
     let mut tt = truth.tree.joints.clone();
     println!("{}: {} of {} parts", truth.object, d.tree.joints.len(), tt.len());

@@ -194,6 +194,20 @@ impl Evidence {
             .collect()
     }
 
+    /// Moves what each state measured (its samples; the grid is too coarse to care).
+    pub fn transform(&mut self, corrections: &[Pose]) {
+        let motions: Vec<Motion> = corrections.iter().map(|c| Motion::from(*c)).collect();
+        for s in &mut self.samples {
+            let m = &motions[s.state];
+            (s.point, s.normal) = (m.apply(s.point), m.rot * s.normal);
+        }
+        for (cloud, m) in self.clouds.iter_mut().zip(&motions) {
+            let points = cloud.points.iter().map(|x| m.apply(*x)).collect();
+            let normals = cloud.normals.iter().map(|n| m.rot * *n).collect();
+            *cloud = Surface::new(points, normals);
+        }
+    }
+
     /// Marks the surface cells that one of `parts` explains: never contradicted, and confirmed by half of the states.
     pub fn mark_taken(&mut self, parts: &[Vec<Pose>]) {
         let n = self.n_states();

@@ -10,4 +10,5 @@ pub mod plausible;
 pub mod propose;
 pub mod refine;
 pub mod scan;
+pub mod settle;
 pub mod space;

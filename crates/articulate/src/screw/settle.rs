@@ -1,0 +1,152 @@
+//! From a discovery to the final answer: labels of all samples, states brought into one frame by what stands still, all
+//! joints refined together.
+
+use super::discover::{Discovery, poses_of};
+use super::evidence::{Evidence, Motion, Sample, Verdict};
+use super::refine::{Report, Settings, refine};
+use crate::icp::{self, Surface};
+use glam::{DVec3, Vec3};
+use hingecast_geom::pose::{quat_from_rotation_vector, rotation_vector};
+use hingecast_geom::{KinematicTree, Pose};
+use rayon::prelude::*;
+
+/// The final tree, and what it was found with.
+pub struct Settled {
+    pub tree: KinematicTree,
+    /// Part of every sample of the evidence.
+    pub labels: Vec<u8>,
+    /// Per state: world from the world that its cameras believed in.
+    pub rig: Vec<Pose>,
+    pub report: Report,
+}
+
+/// Rounds of smoothing the labels' costs over neighbours.
+const SMOOTHING: usize = 3;
+/// Samples that hold a state's frame.
+const HOLDING: usize = 3000;
+/// Fewer samples of the base than this do not hold a state's frame.
+const FEW: usize = 150;
+/// Noise below this share of a voxel: the states' frames agree already.
+const SHARP: f32 = 0.05;
+
+pub fn settle(evidence: &mut Evidence, found: &Discovery, seed: u64) -> Settled {
+    let n_states = evidence.n_states();
+    let voxel = evidence.lattice.voxel as f64;
+    let mut tree = found.tree.clone();
+    let mut rig = vec![Pose::IDENTITY; n_states];
+    let mut labels = label(evidence, &found.verdicts);
+    let free = vec![true; tree.joints.len()];
+    let noisy = evidence.tolerance > SHARP * 4.0 * evidence.lattice.voxel;
+    let mut report = Report::default();
+    for round in 0..3 {
+        if noisy {
+            let moved = frames(evidence, &labels, seed);
+            for (r, m) in rig.iter_mut().zip(&moved) {
+                *r = *m * *r;
+            }
+            evidence.transform(&moved);
+        }
+        let members: Vec<(Sample, usize)> =
+            evidence.samples.iter().zip(&labels).map(|(s, l)| (*s, *l as usize)).filter(|m| m.1 != 0).collect();
+        let gate = if round == 0 { 1.0 } else { 0.6 } * voxel;
+        let settings = Settings { gates: [gate, 0.5 * gate], rounds: 6, partners: 6 };
+        report = refine(evidence, &mut tree, &members, &free, &settings, seed ^ round);
+        let verdicts: Vec<Vec<Verdict>> =
+            (0..tree.parts.len()).map(|p| evidence.judge(&poses_of(&tree, p, n_states))).collect();
+        labels = label(evidence, &verdicts);
+    }
+    tidy(&mut tree);
+    Settled { tree, labels, rig, report }
+}
+
+/// The part of every sample: fewest contradictions, most support, smoothed over neighbours of the same state.
+pub fn label(evidence: &Evidence, verdicts: &[Vec<Verdict>]) -> Vec<u8> {
+    let n = verdicts[0].len();
+    let mut costs: Vec<Vec<f32>> = verdicts
+        .iter()
+        .map(|part| part.iter().map(|v| 2.0 * v.against.count_ones() as f32 - v.support.count_ones() as f32).collect())
+        .collect();
+    for _ in 0..SMOOTHING {
+        costs = costs
+            .iter()
+            .map(|c| {
+                let mean = |i: usize| {
+                    let near = &evidence.neighbours[i];
+                    let sum: f32 = near.iter().map(|&j| c[j as usize]).sum();
+                    0.4 * c[i] + 0.6 * sum / near.len().max(1) as f32
+                };
+                (0..n).into_par_iter().map(mean).collect()
+            })
+            .collect();
+    }
+    // Ties go to the base.
+    let best = |i: usize| {
+        (0..costs.len()).fold(0, |best, p| if costs[p][i] < costs[best][i] - 1e-3 { p } else { best }) as u8
+    };
+    (0..n).map(best).collect()
+}
+
+/// Corrections that bring the base of every state onto the base of all others; their mean is nothing.
+fn frames(evidence: &Evidence, labels: &[u8], seed: u64) -> Vec<Pose> {
+    let n_states = evidence.n_states();
+    let mut rng = fastrand::Rng::with_seed(seed);
+    let own: Vec<Vec<Sample>> = (0..n_states)
+        .map(|state| {
+            let base = evidence.samples.iter().zip(labels).filter(|(s, l)| s.state == state && **l == 0);
+            let mut base: Vec<Sample> = base.map(|(s, _)| *s).collect();
+            rng.shuffle(&mut base);
+            base.truncate(HOLDING);
+            base
+        })
+        .collect();
+    let voxel = evidence.lattice.voxel as f64;
+    let mut out = vec![Pose::IDENTITY; n_states];
+    for _ in 0..3 {
+        // Everything that stands still, seen by all states together.
+        let moved = own.iter().zip(&out).flat_map(|(samples, pose)| {
+            let m = Motion::from(*pose);
+            samples.iter().map(move |s| (m.apply(s.point), m.rot * s.normal))
+        });
+        let cloud = super::cloud::merge(moved, evidence.lattice.voxel, 2);
+        let all = Surface::new(cloud.points, cloud.normals);
+        out = own
+            .par_iter()
+            .zip(&out)
+            .map(|(samples, pose)| {
+                if samples.len() < FEW {
+                    return *pose;
+                }
+                let points: Vec<Vec3> = samples.iter().map(|s| s.point).collect();
+                let normals: Vec<Vec3> = samples.iter().map(|s| s.normal).collect();
+                icp::align(&points, &normals, &all, *pose, &[voxel, voxel, 0.6 * voxel, 0.6 * voxel]).0
+            })
+            .collect();
+        out = centred(&out, &own);
+    }
+    out
+}
+
+/// Takes the mean turn and shift out.
+fn centred(poses: &[Pose], own: &[Vec<Sample>]) -> Vec<Pose> {
+    let all = own.iter().flatten().fold((DVec3::ZERO, 0.0), |(sum, n), s| (sum + s.point.as_dvec3(), n + 1.0));
+    let centre = all.0 / f64::max(all.1, 1.0);
+    let n = poses.len() as f64;
+    let turn = poses.iter().map(|c| rotation_vector(c.rot)).sum::<DVec3>() / n;
+    let shift = poses.iter().map(|c| c.apply(centre) - centre).sum::<DVec3>() / n;
+    let rot = quat_from_rotation_vector(turn);
+    let back = Pose::new(rot, centre + shift - rot * centre).inverse();
+    poses.iter().map(|c| back * *c).collect()
+}
+
+/// Values count from the first state, mostly upwards; limits are what was seen.
+fn tidy(tree: &mut KinematicTree) {
+    for joint in &mut tree.joints {
+        let zero = joint.values[0];
+        joint.values.iter_mut().for_each(|v| *v -= zero);
+        if joint.values.iter().sum::<f64>() < 0.0 {
+            joint.screw.axis = -joint.screw.axis;
+            joint.values.iter_mut().for_each(|v| *v = -*v);
+        }
+        joint.limits = joint.values.iter().fold([0.0f64; 2], |l, v| [l[0].min(*v), l[1].max(*v)]);
+    }
+}
