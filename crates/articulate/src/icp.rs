@@ -38,6 +38,19 @@ pub struct IcpReport {
 /// Improves `start` (world at the target state from world at the source state) for `points` with `normals`.
 /// `gates`: largest accepted distance per round, scene units.
 pub fn align(points: &[Vec3], normals: &[Vec3], target: &Surface, start: Pose, gates: &[f64]) -> (Pose, IcpReport) {
+    align_tethered(points, normals, target, start, gates, 0.0)
+}
+
+/// As [`align`], with every point tied to where it was given by `tether` times the pull towards a plane: directions that
+/// the surface leaves open (a plane sliding in itself) stay as they were recorded.
+pub fn align_tethered(
+    points: &[Vec3],
+    normals: &[Vec3],
+    target: &Surface,
+    start: Pose,
+    gates: &[f64],
+    tether: f64,
+) -> (Pose, IcpReport) {
     let mut pose = start;
     let mut report = IcpReport { inliers: 0.0, rms: f64::INFINITY };
     for &gate in gates {
@@ -58,10 +71,21 @@ pub fn align(points: &[Vec3], normals: &[Vec3], target: &Surface, start: Pose, g
                     }
                     let r = normal.dot(x - target.points[j]) as f64;
                     let (x, normal) = (x.as_dvec3(), normal.as_dvec3());
-                    let c = x.cross(normal);
-                    let row = Vector6::new(c.x, c.y, c.z, normal.x, normal.y, normal.z);
+                    let along = |n: DVec3| {
+                        let c = x.cross(n);
+                        Vector6::new(c.x, c.y, c.z, n.x, n.y, n.z)
+                    };
+                    let row = along(normal);
                     a += row * row.transpose();
                     b -= row * r;
+                    if tether > 0.0 {
+                        let off = x - points[i].as_dvec3();
+                        for n in [DVec3::X, DVec3::Y, DVec3::Z] {
+                            let row = along(n);
+                            a += tether * row * row.transpose();
+                            b -= tether * row * off.dot(n);
+                        }
+                    }
                     sum += r * r;
                     n += 1;
                 }

@@ -47,6 +47,7 @@ fn main() {
     eprintln!("discover {:.1}  unexplained {:.4}", t0.elapsed().as_secs_f64(), d.unexplained);
     let st = hingecast_articulate::screw::settle::settle(&mut ev, &d, 0);
     eprintln!("settle {:.1} noise {} rms {} sigmas {:?}", t0.elapsed().as_secs_f64(), ev.tolerance, st.report.rms, st.report.sigmas);
+    for (s, r) in st.rig.iter().enumerate() { if s % 4 == 0 { eprintln!("rig {s} {:.4} deg {:.4}", r.angle().to_degrees(), r.trans.length()); } }
     let d = st;
     let truth = Truth::open(&Truth::folder_of(&path)).unwrap();
     let mut tt = truth.tree.joints.clone();
@@ -66,6 +67,8 @@ fn main() {
         let t = tt.remove(b);
         let sgn = if t.screw.axis.dot(j.screw.axis) < 0.0 {-1.0} else {1.0};
         let dq = (0..rec.n_states).map(|s| (sgn*(t.values[s]-t.values[0])-j.values[s]).abs()).sum::<f64>()/rec.n_states as f64;
+        eprintln!("  ERR {:.4?}", (0..rec.n_states).map(|s| j.values[s]-sgn*(t.values[s]-t.values[0])).collect::<Vec<_>>());
+        eprintln!("  VAL {:.3?}", (0..rec.n_states).map(|s| t.values[s]).collect::<Vec<_>>());
         let dist = { let n = t.screw.axis.cross(j.screw.axis); let v=j.screw.pivot-t.screw.pivot; if n.length()<1e-6 {v.cross(t.screw.axis).length()} else {(n.dot(v)).abs()/n.length()} };
         println!("  {:?} true {:?}: axis {:.3} deg  pos {:.5} pivotline {:.5}  dq {:.5} parent {}", j.screw.kind, t.screw.kind, t.screw.axis.cross(j.screw.axis).length().clamp(-1.0,1.0).asin().to_degrees(), dist, t.screw.distance(j.screw.pivot), dq, j.parent);
     }

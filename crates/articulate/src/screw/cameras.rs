@@ -17,6 +17,9 @@ const ROUNDS: usize = 7;
 const POINTS: usize = 1200;
 /// Fewer points hold no camera.
 const FEW: usize = 60;
+/// Pull towards the recorded pose, share of the pull towards the surface. Front and back of a box are never in one picture:
+/// how thick it is only the recorded poses know.
+const TETHER: f64 = 0.01;
 /// Below this share of a voxel the views agree already.
 const SHARP: f32 = 0.04;
 
@@ -57,7 +60,7 @@ pub fn align(views: &mut [DepthView], voxel: f32) -> [f32; 2] {
                     return (*c, 0.0);
                 }
                 let (points, normals): (Vec<Vec3>, Vec<Vec3>) = p.iter().copied().unzip();
-                let (pose, report) = icp::align(&points, &normals, &surface, *c, &gates);
+                let (pose, report) = icp::align_tethered(&points, &normals, &surface, *c, &gates, TETHER);
                 if report.inliers < 0.3 { (*c, 0.0) } else { (pose, report.rms) }
             })
             .collect();

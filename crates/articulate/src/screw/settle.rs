@@ -26,6 +26,8 @@ const SMOOTHING: usize = 3;
 const HOLDING: usize = 3000;
 /// Fewer samples of the base than this do not hold a state's frame.
 const FEW: usize = 150;
+/// Pull towards the state's own frame in directions that its base leaves open, share of the pull towards the surface.
+const TETHER: f64 = 0.003;
 /// Noise below this share of a voxel: the states' frames agree already.
 const SHARP: f32 = 0.05;
 
@@ -118,7 +120,7 @@ fn frames(evidence: &Evidence, labels: &[u8], seed: u64) -> Vec<Pose> {
                 }
                 let points: Vec<Vec3> = samples.iter().map(|s| s.point).collect();
                 let normals: Vec<Vec3> = samples.iter().map(|s| s.normal).collect();
-                icp::align(&points, &normals, &all, *pose, &[voxel, voxel, 0.6 * voxel, 0.6 * voxel]).0
+                icp::align_tethered(&points, &normals, &all, *pose, &[voxel, voxel, 0.6 * voxel, 0.6 * voxel], TETHER).0
             })
             .collect();
         out = centred(&out, &own);
