@@ -159,8 +159,8 @@ pub struct BuildSettings {
     /// fast: 12 k gaussians, 1500 steps; default: 24 k, 4000; best: 40 k, 10 000 and finer meshes.
     #[arg(long, value_enum, default_value = "default", hide_possible_values = true)]
     pub preset: Preset,
-    /// How motion, parts and joints are found; track: Dynamic 3D Gaussians' tracking, distance clustering, ICP, RANSAC axis
-    /// [default: track].
+    /// How parts and joints are found; screw: by the depth of all states at once; track: the classical way, Dynamic 3D
+    /// Gaussians' tracking, distance clustering, ICP, RANSAC axis [default: screw].
     #[arg(long, value_enum, hide_possible_values = true)]
     pub method: Option<Method>,
     /// TOML file with settings; its keys beat the preset. A run's own config.toml shows all keys with units.

@@ -1,6 +1,7 @@
 //! The resolved configuration of a build: preset < config file < flags and `--set`.
 
 use crate::failure::{Failure, Result};
+use crate::pipeline::overrides::JointOverride;
 use hingecast_articulate as articulate;
 use serde::{Deserialize, Serialize};
 use std::path::Path;
@@ -18,6 +19,8 @@ pub enum Preset {
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, clap::ValueEnum)]
 #[serde(rename_all = "lowercase")]
 pub enum Method {
+    /// Parts and joints from the depth of all states at once.
+    Screw,
     /// The classical way: Dynamic 3D Gaussians' tracking, distance clustering, ICP, RANSAC axis.
     Track,
 }
@@ -32,10 +35,13 @@ pub struct Config {
     /// Decoded images kept in memory, MB.
     pub memory_mb: usize,
     pub fit: Fit,
+    pub screw: articulate::screw::Config,
     pub track: articulate::track::Config,
     pub parts: articulate::segment::Config,
     pub joints: articulate::joints::Config,
     pub twin: hingecast_twin::Config,
+    /// A person's corrections.
+    pub joint: Vec<JointOverride>,
 }
 
 #[derive(Clone, Debug, Serialize, Deserialize)]
@@ -56,15 +62,17 @@ impl Default for Fit {
 impl Default for Config {
     fn default() -> Self {
         Self {
-            method: Method::Track,
+            method: Method::Screw,
             preset: Preset::Default,
             seed: 0,
             memory_mb: 1000,
             fit: Fit::default(),
+            screw: Default::default(),
             track: Default::default(),
             parts: Default::default(),
             joints: Default::default(),
             twin: Default::default(),
+            joint: Vec::new(),
         }
     }
 }
@@ -141,6 +149,8 @@ impl Config {
             ("memory_mb", self.memory_mb as f64, from(1), "MB"),
             ("fit.gaussians", self.fit.gaussians as f64, (100.0, 1e7), "a number"),
             ("fit.steps", self.fit.steps as f64, from(1), "steps"),
+            ("screw.cells", self.screw.cells as f64, (24.0, 400.0), "cells"),
+            ("screw.max_parts", self.screw.max_parts as f64, (0.0, 100.0), "moving parts"),
             ("track.steps", self.track.steps as f64, from(1), "steps per state"),
             ("track.rate[0]", self.track.rate[0] as f64, share, "share of the diagonal"),
             ("track.rate[1]", self.track.rate[1] as f64, share, "share of the diagonal"),

@@ -155,7 +155,7 @@ fn main() {
         })
         .collect();
     let get = |i: usize| Arc::clone(&targets[i]);
-    let views = Views { count: targets.len(), get: &get };
+    let views = Views { count: targets.len(), get: &get, poses: None };
 
     let start = Instant::now();
     let first = initialise(&views, n, 1).expect("depth to start from");

@@ -102,6 +102,9 @@ pub fn fit(
         if i == half_until {
             halved = Halved::default();
         }
+        if let Some(poses) = views.poses {
+            engine.set_poses(&poses(view))?;
+        }
         recent.push(engine.step(&target, &loss, &rates_at(config, &state))?);
         state.iteration += 1;
 

@@ -13,11 +13,15 @@ const MOST_SAMPLES: usize = 2_000_000;
 const DEPTH_STEP: f64 = 0.03;
 
 /// A pixel's piece of surface.
-#[derive(Clone, Copy)]
-struct Sample {
-    position: Vec3,
-    normal: Vec3,
-    colour: Vec3,
+#[derive(Clone, Copy, Debug)]
+pub struct SurfaceSample {
+    pub position: Vec3,
+    /// Unit, towards the camera.
+    pub normal: Vec3,
+    /// 0..1
+    pub colour: Vec3,
+    /// Samples of different groups never share a gaussian.
+    pub group: u16,
 }
 
 /// About `n` gaussians, evenly spread over the surface: standard deviations 0.55 of the spacing along the surface and 0.1
@@ -32,35 +36,34 @@ pub fn initialise(views: &Views, n: usize, seed: u64) -> Result<Gaussians, Splat
     if n == 0 {
         return Err(SplatError::Range { what: "number of gaussians", value: 0.0, range: "1.." });
     }
-    let samples = surface_samples(views, seed);
-    if samples.is_empty() { from_hull(views, n, seed) } else { Ok(from_surface(&samples, n)) }
+    let own = |v: usize| surface_samples(&(views.get)(v), views.count, seed.wrapping_add(v as u64));
+    let samples: Vec<SurfaceSample> = (0..views.count).flat_map(own).collect();
+    if samples.is_empty() { from_hull(views, n, seed) } else { Ok(from_surface(&samples, n).0) }
 }
 
-/// Every pixel with depth, or every k-th when there are too many.
-fn surface_samples(views: &Views, seed: u64) -> Vec<Sample> {
+/// Every pixel of one of `count` views with depth, or every k-th when there are too many; group 0, world frame.
+pub fn surface_samples(target: &Target, count: usize, seed: u64) -> Vec<SurfaceSample> {
     let mut rng = fastrand::Rng::with_seed(seed);
     let mut out = Vec::new();
-    for v in 0..views.count {
-        let target = (views.get)(v);
-        let (depth, mask) = target.depth_and_mask();
-        let pixels = depth.iter().zip(&mask).filter(|(z, m)| **z > 0.0 && **m > 0.5).count();
-        let keep = (MOST_SAMPLES as f64 / views.count as f64 / pixels.max(1) as f64).min(1.0);
-        let rgb = target.rgb();
-        let (w, h) = (target.camera.width, target.camera.height);
-        for y in 0..h {
-            for x in 0..w {
-                let i = y * w + x;
-                let counts = depth[i] > 0.0 && mask[i] > 0.5 && target.weight_at(x, y) > 0.5;
-                if !counts || (keep < 1.0 && rng.f64() > keep) {
-                    continue;
-                }
-                let Some(normal) = normal(&target, &depth, x, y) else { continue };
-                out.push(Sample {
-                    position: point(&target, &depth, x, y).as_vec3(),
-                    normal,
-                    colour: Vec3::new(rgb[3 * i], rgb[3 * i + 1], rgb[3 * i + 2]),
-                });
+    let (depth, mask) = target.depth_and_mask();
+    let pixels = depth.iter().zip(&mask).filter(|(z, m)| **z > 0.0 && **m > 0.5).count();
+    let keep = (MOST_SAMPLES as f64 / count as f64 / pixels.max(1) as f64).min(1.0);
+    let rgb = target.rgb();
+    let (w, h) = (target.camera.width, target.camera.height);
+    for y in 0..h {
+        for x in 0..w {
+            let i = y * w + x;
+            let counts = depth[i] > 0.0 && mask[i] > 0.5 && target.weight_at(x, y) > 0.5;
+            if !counts || (keep < 1.0 && rng.f64() > keep) {
+                continue;
             }
+            let Some(normal) = normal(target, &depth, x, y) else { continue };
+            out.push(SurfaceSample {
+                position: point(target, &depth, x, y).as_vec3(),
+                normal,
+                colour: Vec3::new(rgb[3 * i], rgb[3 * i + 1], rgb[3 * i + 2]),
+                group: 0,
+            });
         }
     }
     out
@@ -103,8 +106,9 @@ fn normal(target: &Target, depth: &[f32], x: usize, y: usize) -> Option<Vec3> {
     Some((if n.dot(towards) < 0.0 { -n } else { n }).as_vec3())
 }
 
-/// One gaussian per occupied voxel and side; the voxel size is searched for about `n`.
-fn from_surface(samples: &[Sample], n: usize) -> Gaussians {
+/// One gaussian per group, occupied voxel and side; the voxel size is searched for about `n`. Answers the gaussians and
+/// their groups.
+pub fn from_surface(samples: &[SurfaceSample], n: usize) -> (Gaussians, Vec<u16>) {
     let (mut lo, mut hi) = (Vec3::INFINITY, Vec3::NEG_INFINITY);
     for s in samples {
         (lo, hi) = (lo.min(s.position), hi.max(s.position));
@@ -122,6 +126,7 @@ fn from_surface(samples: &[Sample], n: usize) -> Gaussians {
         }
         voxel *= ratio.sqrt().clamp(0.2, 5.0);
     }
+    let groups = best.iter().map(|s| s.group).collect();
     let mut g = Gaussians::default();
     for s in best {
         let q = Quat::from_rotation_arc(Vec3::Z, s.normal);
@@ -131,7 +136,7 @@ fn from_surface(samples: &[Sample], n: usize) -> Gaussians {
         g.opacities.push(logit(0.9));
         g.sh0.push(((s.colour - 0.5) / SH_C0).into());
     }
-    g
+    (g, groups)
 }
 
 fn logit(p: f32) -> f32 {
@@ -139,19 +144,20 @@ fn logit(p: f32) -> f32 {
 }
 
 /// Means per voxel; samples that face away from the voxel's first one are a second surface (the back of a thin sheet).
-fn merge(samples: &[Sample], origin: Vec3, voxel: f32) -> Vec<Sample> {
-    let mut keyed: Vec<(u64, u32)> = samples
+fn merge(samples: &[SurfaceSample], origin: Vec3, voxel: f32) -> Vec<SurfaceSample> {
+    let mut keyed: Vec<((u16, u64), u32)> = samples
         .iter()
         .enumerate()
         .map(|(i, s)| {
             let c = ((s.position - origin) / voxel).as_u64vec3().min(glam::U64Vec3::splat((1 << 21) - 1));
-            (c.x | c.y << 21 | c.z << 42, i as u32)
+            ((s.group, c.x | c.y << 21 | c.z << 42), i as u32)
         })
         .collect();
     keyed.sort_unstable();
     let mut out = Vec::new();
     for group in keyed.chunk_by(|a, b| a.0 == b.0) {
-        let first = samples[group[0].1 as usize].normal;
+        let leader = &samples[group[0].1 as usize];
+        let first = leader.normal;
         let mut sides = [(Vec3::ZERO, Vec3::ZERO, Vec3::ZERO, 0f32); 2];
         for &(_, i) in group {
             let s = &samples[i as usize];
@@ -165,7 +171,8 @@ fn merge(samples: &[Sample], origin: Vec3, voxel: f32) -> Vec<Sample> {
             // A single stray pixel among many is noise.
             if count > 0.0 && count >= 0.05 * group.len() as f32 {
                 let normal = normal.try_normalize().unwrap_or(first);
-                out.push(Sample { position: position / count, normal, colour: colour / count });
+                let (position, colour) = (position / count, colour / count);
+                out.push(SurfaceSample { position, normal, colour, group: leader.group });
             }
         }
     }

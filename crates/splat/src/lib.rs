@@ -38,7 +38,7 @@ pub use adam::Rates;
 pub use engine::{Engine, Gradients, PixelGradients, Render, RenderOptions};
 pub use error::SplatError;
 pub use fit::{FitConfig, FitReport, fit};
-pub use init::initialise;
+pub use init::{SurfaceSample, from_surface, initialise, surface_samples};
 pub use kernels::Simd;
 pub use loss::{DepthLoss, LossConfig, LossTerms};
 pub use median::Hit;

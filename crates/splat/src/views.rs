@@ -2,7 +2,7 @@
 
 use crate::error::SplatError;
 use crate::target::{Pixels, Target, TargetImages};
-use hingecast_geom::Camera;
+use hingecast_geom::{Camera, Pose};
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
@@ -11,6 +11,8 @@ use std::sync::Arc;
 pub struct Views<'a> {
     pub count: usize,
     pub get: &'a dyn Fn(usize) -> Arc<Target>,
+    /// Poses of the engine's groups in each view (see [`crate::Engine::set_groups`]); `None`: they stay as they are.
+    pub poses: Option<&'a dyn Fn(usize) -> Vec<Pose>>,
 }
 
 impl Target {

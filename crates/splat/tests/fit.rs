@@ -99,7 +99,7 @@ fn held_out(engine: &mut Engine) -> (f64, f64, f32) {
 fn from_depth() {
     let targets = targets(true);
     let get = |i: usize| Arc::clone(&targets[i]);
-    let views = Views { count: targets.len(), get: &get };
+    let views = Views { count: targets.len(), get: &get, poses: None };
     let first = initialise(&views, 2000, 1).unwrap();
     assert!((1800..2200).contains(&first.len()), "{} gaussians", first.len());
     assert!(first == initialise(&views, 2000, 1).unwrap(), "the same seed gives the same gaussians");
@@ -122,7 +122,7 @@ fn from_depth() {
 fn from_masks_alone() {
     let targets = targets(false);
     let get = |i: usize| Arc::clone(&targets[i]);
-    let views = Views { count: targets.len(), get: &get };
+    let views = Views { count: targets.len(), get: &get, poses: None };
     let mut engine = Engine::from_gaussians(&initialise(&views, 1500, 1).unwrap(), 2).unwrap();
     let config = FitConfig { iterations: 900, ..FitConfig::default() };
     fit(&mut engine, &views, &config, &Progress::default()).unwrap();
@@ -135,7 +135,7 @@ fn from_masks_alone() {
 fn a_stopped_fit_resumes_to_the_same_bytes() {
     let targets = targets(true);
     let get = |i: usize| Arc::clone(&targets[i]);
-    let views = Views { count: targets.len(), get: &get };
+    let views = Views { count: targets.len(), get: &get, poses: None };
     let first = initialise(&views, 800, 1).unwrap();
     let folder = tempfile::tempdir().unwrap();
     let plain = FitConfig { iterations: 200, relocate_every: 60, ..FitConfig::default() };
@@ -167,7 +167,7 @@ fn a_stopped_fit_resumes_to_the_same_bytes() {
 fn a_group_pose_is_found_by_its_twist_gradient() {
     let targets = targets(true);
     let get = |i: usize| Arc::clone(&targets[i]);
-    let views = Views { count: targets.len(), get: &get };
+    let views = Views { count: targets.len(), get: &get, poses: None };
     let mut engine = Engine::from_gaussians(&initialise(&views, 1500, 1).unwrap(), 2).unwrap();
     fit(&mut engine, &views, &FitConfig { iterations: 300, ..FitConfig::default() }, &Progress::default()).unwrap();
 

@@ -79,7 +79,7 @@ fn gaussians_of(n: usize) -> Gaussians {
 #[test]
 fn no_views() {
     let get = |_: usize| -> Arc<Target> { unreachable!("there are no views") };
-    assert!(matches!(initialise(&Views { count: 0, get: &get }, 10, 0), Err(SplatError::Empty { .. })));
+    assert!(matches!(initialise(&Views { count: 0, get: &get, poses: None }, 10, 0), Err(SplatError::Empty { .. })));
 }
 
 #[test]

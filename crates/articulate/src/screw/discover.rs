@@ -112,13 +112,6 @@ fn grow(evidence: &mut Evidence, node: &Node, width: usize, cost: f64, seed: u64
         })
         .collect();
     finals.sort_by(|a, b| b.0.total_cmp(&a.0));
-    if std::env::var_os("PROBE").is_some() {
-        eprintln!("  open {} of {} merit {:.0}", node.open.len(), evidence.samples.len(), node.merit);
-        for (g, t) in &finals {
-            let j = t.joints.last().unwrap();
-            eprintln!("    {g:.0} on {} {:?} {:.3} at {:.3} {:.2?}", j.parent, j.screw.kind, j.screw.axis, j.screw.pivot, j.values);
-        }
-    }
     finals
         .into_iter()
         .take(2 * width)

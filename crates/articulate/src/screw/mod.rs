@@ -1,14 +1,116 @@
-//! Parts and joints from all states' depth at once (`--method screw`).
-pub mod adopt;
+//! Parts and joints from all states' depth at once (`--method screw`). `docs/method.md` has the equations.
+//!
+//! ```text
+//! cloud, space   per state: oriented samples of the surface; a grid of surface, emptiness, and the unseen
+//! cameras        poses corrected so that the views of a state agree
+//! evidence       all states together: what do they say if this sample moved so?
+//! hypotheses     screws from single correspondences        scan       one screw asked in all states
+//! propose        the best of these, aligned, per parent     adopt      a proposal refined into a part
+//! discover       parts one after another, by what they explain (jury) and how usual they are (plausible)
+//! settle         labels, states' frames, all joints together (refine)
+//! doubts         rivals, covariance, what was hardly seen
+//! ```
+
+mod adopt;
 pub mod cameras;
 pub mod cloud;
 pub mod discover;
+pub mod doubts;
 pub mod evidence;
-pub mod hypotheses;
-pub mod jury;
-pub mod plausible;
-pub mod propose;
+mod hypotheses;
+mod jury;
+mod plausible;
+mod propose;
 pub mod refine;
-pub mod scan;
+mod scan;
 pub mod settle;
 pub mod space;
+
+use cloud::DepthView;
+use evidence::{Evidence, MOST_STATES};
+use glam::Vec3;
+use hingecast_geom::{Cancelled, KinematicTree, Pose, Progress};
+use serde::{Deserialize, Serialize};
+
+#[derive(Clone, Debug, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct Config {
+    /// Cells of the grid along the object's longest side.
+    pub cells: usize,
+    /// No more moving parts than this.
+    pub max_parts: usize,
+    /// Correct camera poses by the depth, where it shows that they are off.
+    pub align_cameras: bool,
+}
+
+impl Default for Config {
+    fn default() -> Self {
+        Self { cells: 96, max_parts: 16, align_cameras: true }
+    }
+}
+
+/// A labelled piece of measured surface.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Labelled {
+    pub state: usize,
+    /// World frame.
+    pub point: Vec3,
+    pub part: u8,
+}
+
+/// Everything that the depth says about parts and joints.
+pub struct Found {
+    pub tree: KinematicTree,
+    pub samples: Vec<Labelled>,
+    /// Per state and view: camera_from_world as corrected.
+    pub cameras: Vec<Vec<Pose>>,
+    pub report: refine::Report,
+    pub rivals: Vec<doubts::Rival>,
+    pub doubts: Vec<String>,
+}
+
+/// Finds parts and joints. `extent`: box of the object over all states; `states(s)`: the views of state s.
+///
+/// # Errors
+/// What `states` fails with, or the wish to stop.
+pub fn run<E: From<Cancelled>>(
+    n_states: usize,
+    extent: (Vec3, Vec3),
+    states: &mut dyn FnMut(usize) -> Result<Vec<DepthView>, E>,
+    config: &Config,
+    seed: u64,
+    progress: &Progress,
+) -> Result<Found, E> {
+    let lattice = space::Lattice::new(extent.0, extent.1, config.cells);
+    let mut cameras: Vec<Vec<Pose>> = Vec::new();
+    let mut evidence = Evidence::gather::<E>(
+        n_states.min(MOST_STATES),
+        lattice,
+        &mut |state| {
+            progress.report(state, n_states, "surface and space")?;
+            let mut views = states(state)?;
+            if config.align_cameras {
+                cameras::align(&mut views, lattice.voxel);
+            }
+            cameras.push(views.iter().map(|v| v.camera.camera_from_world).collect());
+            Ok(views)
+        },
+        seed,
+    )?;
+    let discovery = discover::discover(&mut evidence, config.max_parts, seed, progress)?;
+    progress.report(0, 1, "refining")?;
+    let settled = settle::settle(&mut evidence, &discovery, seed);
+    for (views, rig) in cameras.iter_mut().zip(&settled.rig) {
+        views.iter_mut().for_each(|c| *c = *c * rig.inverse());
+    }
+    let (doubts, rivals) = doubts::doubts(&evidence, &settled, discovery.unexplained, seed);
+    let samples = evidence.samples.iter().zip(&settled.labels);
+    Ok(Found {
+        samples: samples.map(|(s, l)| Labelled { state: s.state, point: s.point, part: *l }).collect(),
+        tree: settled.tree,
+        cameras,
+        report: settled.report,
+        rivals,
+        doubts,
+    })
+}

@@ -56,12 +56,14 @@ pub struct Settings {
 }
 
 /// What the last round knew.
-#[derive(Clone, Debug, Default)]
+#[derive(Clone, Debug, Default, serde::Serialize, serde::Deserialize)]
 pub struct Report {
     /// Root mean square of the accepted residuals, scene units.
     pub rms: f64,
     /// Accepted residuals.
     pub rows: usize,
+    /// Mean over all comparisons of r^2 / gate^2, 1 where no surface was found.
+    pub cost: f64,
     /// Standard deviations per joint: axis [rad], pivot [scene units], value (mean over states).
     pub sigmas: Vec<[f64; 3]>,
 }
@@ -78,6 +80,17 @@ struct Slot {
     shape: usize,
     n_shape: usize,
     values: usize,
+}
+
+/// Normal equations and tallies of some members.
+struct Sums {
+    a: DMatrix<f64>,
+    b: DVector<f64>,
+    /// Weighted mean of r^2.
+    squares: f64,
+    rows: usize,
+    cost: f64,
+    asked: usize,
 }
 
 /// Improves the joints for which `free` says so, in place. `members`: samples and their parts.
@@ -112,20 +125,26 @@ pub fn refine(
         let poses: Vec<Vec<Pose>> = (0..n_states).map(|s| tree.poses_at(s)).collect();
         let twists: Vec<Vec<Vec<Twist>>> =
             (0..n_states).map(|s| (0..tree.joints.len()).map(|j| twists(tree, j, s, &poses[s])).collect()).collect();
-        let chunks: Vec<(DMatrix<f64>, DVector<f64>, f64, usize)> = members
+        let chunks: Vec<Sums> = members
             .par_chunks(4096)
             .enumerate()
             .map(|(c, chunk)| {
                 let mut rng = fastrand::Rng::with_seed(seed ^ ((round as u64) << 32) ^ c as u64);
                 let (mut a, mut b) = (DMatrix::zeros(size, size), DVector::zeros(size));
                 let (mut sum, mut weight, mut rows) = (0.0, 0.0, 0);
+                let (mut cost, mut asked) = (0.0, 0);
                 let mut row: Vec<(usize, f64)> = Vec::new();
                 for (sample, part) in chunk {
                     let back = poses[sample.state][*part].inverse();
                     for _ in 0..settings.partners.min(n_states - 1) {
                         let t = (sample.state + 1 + rng.usize(..n_states - 1)) % n_states;
                         let m = poses[t][*part] * back;
-                        let Some((r, n, x)) = residual(evidence, sample, t, &m, gate) else { continue };
+                        asked += 1;
+                        let Some((r, n, x)) = residual(evidence, sample, t, &m, gate) else {
+                            cost += 1.0;
+                            continue;
+                        };
+                        cost += (r / gate).powi(2);
                         row.clear();
                         let rotated = m.rot.conjugate() * n;
                         for &j in &chains[*part] {
@@ -157,17 +176,20 @@ pub fn refine(
                         rows += 1;
                     }
                 }
-                (a, b, sum / f64::max(weight, 1e-300), rows)
+                Sums { a, b, squares: sum / f64::max(weight, 1e-300), rows, cost, asked }
             })
             .collect();
         let (mut a, mut b) = (DMatrix::zeros(size, size), DVector::zeros(size));
-        let (mut sum, mut rows) = (0.0, 0);
+        let (mut sum, mut rows, mut cost, mut asked) = (0.0, 0, 0.0, 0);
         for chunk in chunks {
-            a += chunk.0;
-            b += chunk.1;
-            sum += chunk.2 * chunk.3 as f64;
-            rows += chunk.3;
+            a += chunk.a;
+            b += chunk.b;
+            sum += chunk.squares * chunk.rows as f64;
+            rows += chunk.rows;
+            cost += chunk.cost;
+            asked += chunk.asked;
         }
+        report.cost = cost / asked.max(1) as f64;
         report.rms = (sum / rows.max(1) as f64).sqrt();
         report.rows = rows;
         // Unseen states keep their value; a joint that nothing constrains keeps its place.

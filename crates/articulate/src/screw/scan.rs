@@ -14,12 +14,6 @@ pub struct Scan {
     pub scores: Vec<f32>,
 }
 
-impl Scan {
-    pub fn total(&self) -> f32 {
-        self.scores.iter().map(|s| s.max(-0.5)).sum()
-    }
-}
-
 /// What entering space that was seen empty costs against meeting one surface.
 const EMPTY: f32 = 1.5;
 /// What surface counts that a known part explains already.

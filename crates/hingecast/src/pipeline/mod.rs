@@ -3,20 +3,30 @@
 pub mod joints;
 pub mod labels;
 pub mod motion;
+pub mod overrides;
+pub mod screw;
 pub mod splat;
 pub mod surface;
 pub mod twin;
 
-use crate::config::Config;
+use crate::config::{Config, Method};
 use crate::failure::{Failure, Result};
-use crate::stage::{RunFolder, stamp};
+use crate::stage::{RunFolder, erased, stamp};
 use crate::ui::Ui;
-use hingecast_capture::{Recording, Split, ViewCache};
+use hingecast_capture::{Recording, Split, View, ViewCache};
+use hingecast_geom::Pose;
+use std::collections::BTreeMap;
 use std::path::Path;
+use std::sync::Arc;
 use std::time::Instant;
 
 /// Stages in order; the folder of each bears its name.
-pub const STAGES: [&str; 5] = ["splat", "motion", "parts", "joints", "twin"];
+pub fn stages(method: Method) -> &'static [&'static str] {
+    match method {
+        Method::Screw => &["parts", "splat", "joints", "twin"],
+        Method::Track => &["splat", "motion", "parts", "joints", "twin"],
+    }
+}
 
 /// What every stage may look at.
 pub struct Context<'a> {
@@ -27,6 +37,19 @@ pub struct Context<'a> {
     pub ui: &'a Ui,
     /// Colour behind the object, and whether the pictures really show it.
     pub background: ([f32; 3], bool),
+    /// camera_from_world where the depth corrected it, by frame.
+    pub cameras: BTreeMap<usize, Pose>,
+}
+
+impl Context<'_> {
+    /// A frame's pixels with its corrected camera.
+    pub fn view(&self, frame: usize) -> Result<View> {
+        let mut view = Arc::unwrap_or_clone(self.cache.get(frame)?);
+        if let Some(pose) = self.cameras.get(&frame) {
+            view.camera.camera_from_world = *pose;
+        }
+        Ok(view)
+    }
 }
 
 /// Which stages to run.
@@ -58,50 +81,74 @@ pub fn build(recording: &Path, run: &Path, config: &Config, threads: usize, span
 
     let cache = ViewCache::new(&recording, config.memory_mb << 20);
     let background = splat::background(&recording, &cache)?;
-    let context = Context { recording: &recording, cache: &cache, config, threads, ui, background };
-    let fingerprint = folder.record.fingerprint.clone();
-    let seed = config.seed;
-    let c = config;
-    // Each stamp holds the one before: a change upstream redoes everything after it.
-    let s0 = stamp(&[&fingerprint, &seed, &c.fit]);
-    let s1 = stamp(&[&s0, &c.method, &c.track]);
-    let s2 = stamp(&[&s1, &c.parts]);
-    let s3 = stamp(&[&s2, &c.joints]);
-    let s4 = stamp(&[&s3, &c.twin]);
-    let stamps = [s0, s1, s2, s3, s4];
-
+    let mut context =
+        Context { recording: &recording, cache: &cache, config, threads, ui, background, cameras: BTreeMap::new() };
+    let stages = stages(config.method);
+    let stamps = stamps(config, &folder.record.fingerprint);
     let index = |name: &Option<String>, default: usize| {
         name.as_ref().map_or(Ok(default), |n| {
-            STAGES.iter().position(|s| s == n).ok_or_else(|| {
-                Failure::new(format!("no stage '{n}'"), "--from / --to", format!("one of {}", STAGES.join(", ")))
+            stages.iter().position(|s| s == n).ok_or_else(|| {
+                Failure::new(format!("no stage '{n}'"), "--from / --to", format!("one of {}", stages.join(", ")))
             })
         })
     };
-    let (from, to) = (index(&span.from, STAGES.len())?, index(&span.to, STAGES.len() - 1)?);
-    for (i, stage) in STAGES.iter().enumerate().take(to + 1) {
+    let (from, to) = (index(&span.from, stages.len())?, index(&span.to, stages.len() - 1)?);
+    if !folder.is_done(stages[0], &stamps[0]) {
+        // Another method's stages would stand in the way.
+        folder.record.stages.clear();
+    }
+    for (i, stage) in stages.iter().enumerate().take(to + 1) {
         if i < from && folder.is_done(stage, &stamps[i]) {
             ui.say(&format!("{stage:<7} kept"));
-            continue;
+        } else {
+            if i >= from {
+                // Asked to redo: forget this stage's checkpoint.
+                let path = folder.folder(stage).join("stamp");
+                let _ = std::fs::remove_file(path);
+            }
+            let start = Instant::now();
+            let at = folder.begin(stage, &stamps[i])?;
+            match (config.method, *stage) {
+                (Method::Screw, "parts") => screw::run_parts(&context, &at)?,
+                (Method::Screw, "splat") => screw::run_splat(&context, run, &at)?,
+                (Method::Screw, "joints") => screw::run_joints(&context, run, &at)?,
+                (Method::Track, "splat") => splat::run(&context, &at)?,
+                (Method::Track, "motion") => motion::run(&context, run, &at)?,
+                (Method::Track, "parts") => joints::run_parts(&context, run, &at)?,
+                (Method::Track, "joints") => joints::run_joints(&context, run, &at)?,
+                _ => folder.record.doubts = twin::run(&context, run)?,
+            }
+            let secs = start.elapsed().as_secs_f64();
+            folder.finish(stage, &stamps[i], secs)?;
+            ui.say(&format!("{stage:<7} {secs:.1} s"));
         }
-        if i >= from {
-            // Asked to redo: forget this stage's checkpoint.
-            let path = folder.folder(stage).join("stamp");
-            let _ = std::fs::remove_file(path);
+        if config.method == Method::Screw && i == 0 {
+            context.cameras = screw::load(run)?.cameras;
         }
-        let start = Instant::now();
-        let at = folder.begin(stage, &stamps[i])?;
-        match *stage {
-            "splat" => splat::run(&context, &at)?,
-            "motion" => motion::run(&context, run, &at)?,
-            "parts" => joints::run_parts(&context, run, &at)?,
-            "joints" => joints::run_joints(&context, run, &at)?,
-            _ => folder.record.doubts = twin::run(&context, run)?,
-        }
-        let secs = start.elapsed().as_secs_f64();
-        folder.finish(stage, &stamps[i], secs)?;
-        ui.say(&format!("{stage:<7} {secs:.1} s"));
     }
     Ok(folder)
+}
+
+/// The stages' stamps. Each holds the one before: a change upstream redoes everything after it.
+fn stamps(c: &Config, fingerprint: &str) -> Vec<String> {
+    let chain = |first: String, rest: &[&dyn erased::Json]| {
+        let mut out = vec![first];
+        for own in rest {
+            let before = out.last().cloned().unwrap_or_default();
+            out.push(stamp(&[&before, &own.json()]));
+        }
+        out
+    };
+    match c.method {
+        Method::Screw => {
+            let first = stamp(&[&fingerprint, &c.seed, &c.method, &c.screw]);
+            chain(first, &[&c.fit, &c.joint, &c.twin])
+        }
+        Method::Track => {
+            let first = stamp(&[&fingerprint, &c.seed, &c.method, &c.fit]);
+            chain(first, &[&c.track, &c.parts, &(&c.joints, &c.joint), &c.twin])
+        }
+    }
 }
 
 /// Recordings that no method can build from are refused before any work.
@@ -123,7 +170,7 @@ fn refuse_hopeless(recording: &Recording) -> Result<()> {
         }
     }
     if let Some(i) = recording.frames.iter().position(|f| f.depth.is_none() && f.split == Split::Train) {
-        let what = format!("frames[{i}] has no depth, and the method '{}' needs it", "track");
+        let what = format!("frames[{i}] has no depth, and parts are found by depth");
         return Err(Failure::new(what, place, "add depth_file_path to every frame"));
     }
     Ok(())

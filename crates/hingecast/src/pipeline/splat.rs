@@ -31,7 +31,7 @@ pub fn target(view: &View, background: ([f32; 3], bool)) -> Result<Target> {
 /// Training targets of one state.
 pub fn targets(context: &Context, state: usize) -> Result<Vec<Target>> {
     let frames = context.recording.frames_of(state, Split::Train);
-    frames.par_iter().map(|&f| target(&*context.cache.get(f)?, context.background)).collect()
+    frames.par_iter().map(|&f| target(&context.view(f)?, context.background)).collect()
 }
 
 /// One colour around the object in all pictures (a studio, a renderer), or black and "paint it over".
@@ -60,18 +60,22 @@ pub fn background(recording: &Recording, cache: &ViewCache) -> Result<([f32; 3],
     Ok(colour.map_or(([0.0; 3], false), |c| (c.map(|x| x as f32 / 255.0), true)))
 }
 
-/// Box of the masked depth of the first state, world frame: its diagonal scales every length in the settings.
-pub fn extent(context: &Context) -> Result<(glam::DVec3, glam::DVec3)> {
-    let mut axes: [Vec<f64>; 3] = Default::default();
-    for f in context.recording.frames_of(0, Split::Train) {
-        let view = context.cache.get(f)?;
-        super::surface::unproject(&view, 4, &mut |x, _| {
-            (0..3).for_each(|a| axes[a].push(x[a]));
-        });
-    }
+/// Box of the masked depth of some states, world frame. That of the first state scales every length in the settings.
+pub fn extent(context: &Context, states: &[usize]) -> Result<(glam::DVec3, glam::DVec3)> {
+    let frames: Vec<usize> = states.iter().flat_map(|s| context.recording.frames_of(*s, Split::Train)).collect();
+    let stride = if states.len() > 1 { 8 } else { 4 };
+    let points: Vec<Vec<glam::DVec3>> = frames
+        .par_iter()
+        .map(|&f| {
+            let mut own = Vec::new();
+            super::surface::unproject(&*context.cache.get(f)?, stride, &mut |x, _| own.push(x));
+            Ok(own)
+        })
+        .collect::<Result<_>>()?;
+    let mut axes: [Vec<f64>; 3] = std::array::from_fn(|a| points.iter().flatten().map(|x| x[a]).collect());
     if axes[0].len() < 100 {
         return Err(Failure::new(
-            "the first state shows no object: fewer than 100 pixels have mask and depth",
+            "there is no object: fewer than 100 pixels have mask and depth",
             context.recording.root.display().to_string(),
             "hingecast check RECORDING; are the masks inverted, or the depth unit wrong?",
         ));
@@ -87,7 +91,7 @@ pub fn extent(context: &Context) -> Result<(glam::DVec3, glam::DVec3)> {
 }
 
 pub fn run(context: &Context, at: &Path) -> Result<()> {
-    let (lo, hi) = extent(context)?;
+    let (lo, hi) = extent(context, &[0])?;
     let diagonal = (hi - lo).length();
     let targets: Vec<_> = targets(context, 0)?.into_iter().map(Arc::new).collect();
     let progress = context.ui.stage("splat");
@@ -114,7 +118,7 @@ pub fn load(run: &Path) -> Result<(Gaussians, Extent)> {
 fn fit(context: &Context, targets: &[Arc<Target>], at: &Path, progress: &Progress) -> Result<Gaussians> {
     let settings = &context.config.fit;
     let get = |i: usize| targets[i].clone();
-    let views = Views { count: targets.len(), get: &get };
+    let views = Views { count: targets.len(), get: &get, poses: None };
     let first = initialise(&views, settings.gaussians, context.config.seed)?;
     let mut engine = Engine::from_gaussians(&first, context.threads)?;
     let checkpoint = at.join("checkpoint.bin");

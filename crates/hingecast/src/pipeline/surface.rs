@@ -49,7 +49,7 @@ fn normal(view: &View, i: usize) -> Option<Vec3> {
 /// The surface of `state` from about `wanted` pixels spread over all its training views.
 pub fn of_state(context: &Context, state: usize, wanted: usize) -> Result<Surface> {
     let frames = context.recording.frames_of(state, Split::Train);
-    let views = frames.par_iter().map(|&f| Ok(context.cache.get(f)?)).collect::<Result<Vec<_>>>()?;
+    let views = frames.par_iter().map(|&f| context.view(f)).collect::<Result<Vec<_>>>()?;
     let pixels: usize = views.iter().map(|v| v.mask.iter().filter(|m| **m == 1).count()).sum();
     let stride = ((pixels as f64 / wanted as f64).sqrt().round() as usize).max(1);
     let parts: Vec<(Vec<Vec3>, Vec<Vec3>)> = views

@@ -27,13 +27,13 @@ pub fn run(context: &Context, run: &Path) -> Result<Vec<String>> {
             labeller.pose(&found.tree, &found.tree.values_at(state))?;
             progress.report(k, frames.len(), "")?;
         }
-        labels.push(labeller.label(&*context.cache.get(f)?, tolerance)?);
+        labels.push(labeller.label(&context.view(f)?, tolerance)?);
     }
     drop(labeller);
 
     let progress = context.ui.stage("twin");
     let observe = |i: usize, labels: Vec<u8>| -> Result<Observation> {
-        let view = context.cache.get(frames[i])?;
+        let view = context.view(frames[i])?;
         // Depth of a hand is not depth of the object.
         let depth = view.depth.iter().zip(&view.usable).map(|(d, u)| if *u == 1 { *d } else { 0.0 });
         Ok(Observation {
@@ -41,7 +41,7 @@ pub fn run(context: &Context, run: &Path) -> Result<Vec<String>> {
             camera: view.camera,
             depth: depth.collect(),
             labels,
-            rgb: view.rgb.clone(),
+            rgb: view.rgb,
         })
     };
     let poses: Vec<_> = (0..recording.n_states).map(|s| found.tree.poses_at(s)).collect();

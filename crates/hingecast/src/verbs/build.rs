@@ -4,7 +4,8 @@ use super::{Outcome, Session};
 use crate::cli::{Build, BuildSettings};
 use hingecast::config::Config;
 use hingecast::failure::{Failure, Result};
-use hingecast::pipeline::{self, STAGES, Span};
+use hingecast::config::Method;
+use hingecast::pipeline::{self, Span, stages};
 use hingecast::report;
 use hingecast::stage::RunFolder;
 use std::path::{Path, PathBuf};
@@ -27,11 +28,12 @@ pub fn run_folder(out: Option<&Path>, recording: &Path) -> PathBuf {
 
 /// Stage names that are not there, and `--from` after `--to`: it would do nothing and say that it is done. Asked
 /// before anything is thrown away.
-fn refuse_odd_span(args: &Build) -> Result<()> {
+fn refuse_odd_span(args: &Build, method: Method) -> Result<()> {
+    let stages = stages(method);
     let refuse = |what: String| {
-        Err(Failure::new(what, "--from / --to", format!("the stages are, in order: {}", STAGES.join(", "))))
+        Err(Failure::new(what, "--from / --to", format!("the stages are, in order: {}", stages.join(", "))))
     };
-    let place = |name: &str| STAGES.iter().position(|s| *s == name);
+    let place = |name: &str| stages.iter().position(|s| *s == name);
     for name in [&args.from, &args.to].into_iter().flatten() {
         if place(name).is_none() {
             return refuse(format!("no stage '{name}'"));
@@ -48,9 +50,10 @@ fn refuse_odd_span(args: &Build) -> Result<()> {
 pub fn run(session: &Session, args: &Build) -> Result<Outcome> {
     let out = run_folder(args.out.as_deref(), &args.recording);
     RunFolder::may_become_run(&out)?;
-    refuse_odd_span(args)?;
+    let config = config(&args.settings)?;
+    refuse_odd_span(args, config.method)?;
     let span = Span { from: args.from.clone(), to: args.to.clone(), fresh: args.fresh };
-    let run = pipeline::build(&args.recording, &out, &config(&args.settings)?, session.threads, &span, &session.ui)?;
+    let run = pipeline::build(&args.recording, &out, &config, session.threads, &span, &session.ui)?;
     if let Some(to) = args.to.as_deref().filter(|to| *to != "twin") {
         session.ui.say(&format!("stopped after {to}, as asked; run again without --to for the twin"));
         session.answer(&serde_json::json!({ "run": run.root, "to": to, "secs": run.record.total_secs() }));

@@ -1,0 +1,107 @@
+//! A person's corrections: `[[joint]]` entries of the config overrule what was found; only the stages from `joints` on
+//! run again.
+
+use super::joints::JointsFile;
+use crate::failure::{Failure, Result};
+use glam::DVec3;
+use hingecast_geom::JointKind;
+use serde::{Deserialize, Serialize};
+
+/// One `[[joint]]` entry; what it leaves out stays as found.
+#[derive(Clone, Debug, Default, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct JointOverride {
+    /// Name of the joint that is meant, as in `twin.json` (`joint_1`).
+    pub joint: String,
+    /// New name.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub name: Option<String>,
+    #[serde(rename = "type", skip_serializing_if = "Option::is_none")]
+    pub kind: Option<JointKind>,
+    /// Direction, world frame, any length.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub axis: Option<[f64; 3]>,
+    /// A point on the axis, world frame, scene units, as of the first state.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub pivot: Option<[f64; 3]>,
+    /// Name of the part that carries it.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub parent: Option<String>,
+    /// Degrees for hinges, scene units for slides, from the first state's value.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub limits: Option<[f64; 2]>,
+}
+
+/// Applies the entries in order.
+///
+/// # Errors
+/// Joints or parts that are not there, axes of no length, limits upside down, a tree that hangs on itself.
+pub fn apply(file: &mut JointsFile, entries: &[JointOverride]) -> Result<()> {
+    for (k, entry) in entries.iter().enumerate() {
+        one(file, entry).map_err(|(what, hint)| Failure::new(what, format!("[[joint]] number {}", k + 1), hint))?;
+    }
+    file.tree.validate().map_err(|e| Failure::new(e, "[[joint]]", "change 'parent'"))
+}
+
+fn one(file: &mut JointsFile, entry: &JointOverride) -> std::result::Result<(), (String, String)> {
+    let names: Vec<&str> = file.tree.joints.iter().map(|j| j.name.as_str()).collect();
+    let there = format!("joint = one of: {}", names.join(", "));
+    let Some(j) = names.iter().position(|n| *n == entry.joint) else {
+        return Err((format!("no joint '{}'", entry.joint), there));
+    };
+    let parent = match &entry.parent {
+        None => file.tree.joints[j].parent,
+        Some(name) => file.tree.parts.iter().position(|p| p == name).ok_or_else(|| {
+            (format!("no part '{name}'"), format!("parent = one of: {}", file.tree.parts.join(", ")))
+        })?,
+    };
+    let joint = &mut file.tree.joints[j];
+    // What was in doubt about it a person has now decided.
+    let mark = format!("'{}'", joint.name);
+    file.doubts.retain(|d| !(d.contains(&mark) && (entry.kind.is_some() || entry.axis.is_some())));
+    let before = joint.screw;
+    joint.parent = parent;
+    if let Some(kind) = entry.kind {
+        joint.screw.kind = kind;
+    }
+    if let Some(axis) = entry.axis {
+        let axis = DVec3::from(axis).try_normalize().filter(|a| a.is_finite());
+        let hint = "axis = [x, y, z], not all 0".to_string();
+        joint.screw.axis = axis.ok_or_else(|| ("an axis without direction".to_string(), hint))?;
+    }
+    if let Some(pivot) = entry.pivot {
+        joint.screw.pivot = DVec3::from(pivot);
+    }
+    // The part keeps going where it went, as far as the new screw can take it.
+    if joint.screw != before {
+        let screw = joint.screw;
+        let reach = before.pivot + before.axis.any_orthonormal_vector();
+        for v in &mut joint.values {
+            let to = before.motion(*v).apply(reach) - reach;
+            *v = match (before.kind.turns(), screw.kind.turns()) {
+                (false, true) => {
+                    let arm = reach - screw.foot(reach);
+                    let side = screw.axis.cross(arm);
+                    if side.length() > 1e-9 { to.dot(side.normalize()) / arm.length() } else { 0.0 }
+                }
+                (true, false) => to.dot(screw.axis),
+                _ => *v * if before.axis.dot(screw.axis) < 0.0 { -1.0 } else { 1.0 },
+            };
+        }
+        if screw.kind == JointKind::Fixed {
+            joint.values.iter_mut().for_each(|v| *v = 0.0);
+        }
+        joint.limits = joint.values.iter().fold([0.0f64; 2], |l, v| [l[0].min(*v), l[1].max(*v)]);
+    }
+    if let Some([lo, hi]) = entry.limits {
+        if !(lo <= hi) {
+            return Err((format!("limits {lo} .. {hi} are upside down"), "limits = [lower, upper]".to_string()));
+        }
+        let unit = if joint.screw.kind.turns() { 1f64.to_radians() } else { 1.0 };
+        joint.limits = [lo * unit, hi * unit];
+    }
+    if let Some(name) = &entry.name {
+        joint.name.clone_from(name);
+    }
+    Ok(())
+}
