@@ -24,6 +24,11 @@ impl Surface {
     pub fn nearest(&self, x: Vec3) -> Option<(usize, f32)> {
         self.tree.nearest(x)
     }
+
+    /// Indices of the `k` nearest points, nearest first.
+    pub fn k_nearest(&self, x: Vec3, k: usize) -> Vec<u32> {
+        self.tree.k_nearest(x, k)
+    }
 }
 
 /// How well the aligned points lie on the surface.

@@ -61,7 +61,10 @@ pub struct Labelled {
 /// Everything that the depth says about parts and joints.
 pub struct Found {
     pub tree: KinematicTree,
+    /// The surface of every state, one sample a voxel and facing.
     pub samples: Vec<Labelled>,
+    /// Edge of a voxel, scene units.
+    pub voxel: f32,
     /// Per state and view: camera_from_world as corrected.
     pub cameras: Vec<Vec<Pose>>,
     pub report: refine::Report,
@@ -104,9 +107,14 @@ pub fn run<E: From<Cancelled>>(
         views.iter_mut().for_each(|c| *c = *c * rig.inverse());
     }
     let (doubts, rivals) = doubts::doubts(&evidence, &settled, discovery.unexplained, seed);
-    let samples = evidence.samples.iter().zip(&settled.labels);
+    let labels = settle::label_clouds(&evidence, &settled.tree);
+    let of_state = |(state, own): (usize, &Vec<u8>)| -> Vec<Labelled> {
+        let points = &evidence.clouds[state].points;
+        points.iter().zip(own).map(|(point, part)| Labelled { state, point: *point, part: *part }).collect()
+    };
     Ok(Found {
-        samples: samples.map(|(s, l)| Labelled { state: s.state, point: s.point, part: *l }).collect(),
+        samples: labels.iter().enumerate().flat_map(of_state).collect(),
+        voxel: lattice.voxel,
         tree: settled.tree,
         cameras,
         report: settled.report,

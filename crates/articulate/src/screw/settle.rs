@@ -88,6 +88,42 @@ pub fn label(evidence: &Evidence, verdicts: &[Vec<Verdict>]) -> Vec<u8> {
     (0..n).map(best).collect()
 }
 
+/// Neighbours whose costs smooth a label.
+const NEAR: usize = 8;
+
+/// The part of every point of every state's cloud, by the same rule. [state][point]
+pub fn label_clouds(evidence: &Evidence, tree: &KinematicTree) -> Vec<Vec<u8>> {
+    let n_states = evidence.n_states();
+    let between: Vec<_> = (0..tree.parts.len()).map(|p| evidence.between(&poses_of(tree, p, n_states))).collect();
+    (0..n_states)
+        .map(|state| {
+            let cloud = &evidence.clouds[state];
+            let n = cloud.points.len();
+            let sample = |i: usize| Sample { state, point: cloud.points[i], normal: cloud.normals[i] };
+            let cost = |v: Verdict| 2.0 * v.against.count_ones() as f32 - v.support.count_ones() as f32;
+            let mut costs: Vec<Vec<f32>> = (0..n)
+                .into_par_iter()
+                .map(|i| between.iter().map(|b| cost(evidence.ask_all(&sample(i), &b[state]))).collect())
+                .collect();
+            let near: Vec<Vec<u32>> = (0..n).into_par_iter().map(|i| cloud.k_nearest(cloud.points[i], NEAR)).collect();
+            for _ in 0..SMOOTHING {
+                costs = (0..n)
+                    .into_par_iter()
+                    .map(|i| {
+                        let mean = |p: usize| {
+                            let sum: f32 = near[i].iter().map(|&j| costs[j as usize][p]).sum();
+                            0.3 * costs[i][p] + 0.7 * sum / near[i].len().max(1) as f32
+                        };
+                        (0..between.len()).map(mean).collect()
+                    })
+                    .collect();
+            }
+            let best = |c: &Vec<f32>| (0..c.len()).fold(0, |b, p| if c[p] < c[b] - 1e-3 { p } else { b }) as u8;
+            costs.iter().map(best).collect()
+        })
+        .collect()
+}
+
 /// Corrections that bring the base of every state onto the base of all others; their mean is nothing.
 fn frames(evidence: &Evidence, labels: &[u8], seed: u64) -> Vec<Pose> {
     let n_states = evidence.n_states();

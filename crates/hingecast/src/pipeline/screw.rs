@@ -12,6 +12,7 @@ use hingecast_capture::{Split, View};
 use hingecast_geom::ply::{read_vertices, write_float_vertices};
 use hingecast_geom::{Gaussians, KinematicTree, PointTree, Pose};
 use hingecast_splat::{Engine, FitConfig, SurfaceSample, Target, Views, from_surface, surface_samples};
+use hingecast_twin::{BACKGROUND, UNKNOWN};
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
@@ -30,6 +31,8 @@ pub struct PartsFile {
     /// Box of the object over all states.
     pub lo: [f32; 3],
     pub hi: [f32; 3],
+    /// Spacing of the labelled samples, scene units.
+    pub voxel: f32,
 }
 
 pub fn load(run: &Path) -> Result<PartsFile> {
@@ -83,6 +86,7 @@ pub fn run_parts(context: &Context, at: &Path) -> Result<()> {
     let file = PartsFile {
         cameras: cameras.collect(),
         tree: found.tree,
+        voxel: found.voxel,
         report: found.report,
         rivals: found.rivals,
         doubts: found.doubts,
@@ -168,15 +172,7 @@ fn canonical_samples(
     poses: &[Vec<Pose>],
     diagonal: f64,
 ) -> Result<Vec<SurfaceSample>> {
-    let labelled = load_samples(run)?;
-    let by_state: Vec<(PointTree, Vec<u8>)> = (0..poses.len())
-        .into_par_iter()
-        .map(|state| {
-            let own: Vec<&Labelled> = labelled.iter().filter(|s| s.state == state).collect();
-            let points: Vec<Vec3> = own.iter().map(|s| s.point).collect();
-            (PointTree::new(&points), own.iter().map(|s| s.part).collect())
-        })
-        .collect();
+    let by_state = surfaces(run, poses.len())?;
     // Farther from every sample is stray depth.
     let reach = (0.04 * diagonal as f32).powi(2);
     let each = targets.par_iter().enumerate().map(|(v, target)| {
@@ -195,6 +191,36 @@ fn canonical_samples(
         own
     });
     Ok(each.collect::<Vec<_>>().concat())
+}
+
+/// Per state: a tree over its labelled samples, and their parts.
+fn surfaces(run: &Path, n_states: usize) -> Result<Vec<(PointTree, Vec<u8>)>> {
+    let labelled = load_samples(run)?;
+    let of_state = |state: usize| {
+        let own: Vec<&Labelled> = labelled.iter().filter(|s| s.state == state).collect();
+        let points: Vec<Vec3> = own.iter().map(|s| s.point).collect();
+        (PointTree::new(&points), own.iter().map(|s| s.part).collect())
+    };
+    Ok((0..n_states).into_par_iter().map(of_state).collect())
+}
+
+/// Part of every pixel of `frames`: that of the nearest labelled sample of its state.
+pub fn pixel_labels(context: &Context, run: &Path, frames: &[usize]) -> Result<Vec<Vec<u8>>> {
+    let by_state = surfaces(run, context.recording.n_states)?;
+    let reach = (2.0 * load(run)?.voxel).powi(2);
+    let of_frame = |&f: &usize| -> Result<Vec<u8>> {
+        let view = context.view(f)?;
+        let (tree, parts) = &by_state[context.recording.frames[f].state];
+        let silent = |i: usize| if view.usable[i] == 1 && view.mask[i] == 0 && !(view.depth[i] > 0.0) { BACKGROUND } else { UNKNOWN };
+        let mut out: Vec<u8> = (0..view.mask.len()).map(silent).collect();
+        super::surface::unproject(&view, 1, &mut |x, i| {
+            if let Some((k, _)) = tree.nearest(x.as_vec3()).filter(|n| n.1 < reach) {
+                out[i] = parts[k];
+            }
+        });
+        Ok(out)
+    };
+    frames.par_iter().map(of_frame).collect()
 }
 
 pub fn run_joints(context: &Context, run: &Path, at: &Path) -> Result<()> {

@@ -1,10 +1,13 @@
 //! Stage `twin`: labelled depth of all states fused, exported, tried in MuJoCo.
 
+use super::joints::JointsFile;
 use super::labels::Labeller;
-use super::{Context, joints, splat};
+use super::{Context, joints, screw, splat};
+use crate::config::Method;
 use crate::failure::{Failure, Result};
 use crate::stage::{read_json, write_json};
 use hingecast_capture::Split;
+use hingecast_geom::Gaussians;
 use hingecast_twin::{Observation, build as twin, relabel};
 use std::path::Path;
 
@@ -16,20 +19,10 @@ pub fn run(context: &Context, run: &Path) -> Result<Vec<String>> {
     let frames: Vec<usize> = (0..recording.n_states).flat_map(|s| recording.frames_of(s, Split::Train)).collect();
 
     // Labels of all frames first: the engine uses all threads for one picture.
-    let progress = context.ui.stage("label");
-    let mut labeller = Labeller::new(&gaussians, &found.labels, context.threads)?;
-    let tolerance = (0.02 * extent.diagonal) as f32;
-    let mut labels = Vec::with_capacity(frames.len());
-    let mut state = usize::MAX;
-    for (k, &f) in frames.iter().enumerate() {
-        if recording.frames[f].state != state {
-            state = recording.frames[f].state;
-            labeller.pose(&found.tree, &found.tree.values_at(state))?;
-            progress.report(k, frames.len(), "")?;
-        }
-        labels.push(labeller.label(&context.view(f)?, tolerance)?);
-    }
-    drop(labeller);
+    let mut labels = match context.config.method {
+        Method::Screw => screw::pixel_labels(context, run, &frames)?,
+        Method::Track => rendered_labels(context, &frames, &gaussians, &found, extent.diagonal)?,
+    };
 
     let progress = context.ui.stage("twin");
     let observe = |i: usize, labels: Vec<u8>| -> Result<Observation> {
@@ -46,7 +39,9 @@ pub fn run(context: &Context, run: &Path) -> Result<Vec<String>> {
     };
     let poses: Vec<_> = (0..recording.n_states).map(|s| found.tree.poses_at(s)).collect();
     let unlabelled = |i: usize| observe(i, Vec::new());
-    relabel::resolve::<Failure>(&mut labels, &unlabelled, &poses, 0.01 * extent.diagonal)?;
+    if context.config.method == Method::Track {
+        relabel::resolve::<Failure>(&mut labels, &unlabelled, &poses, 0.01 * extent.diagonal)?;
+    }
     let load = |i: usize| observe(i, labels[i].clone());
     let input = twin::Input {
         name: &recording.name,
@@ -73,6 +68,30 @@ pub fn run(context: &Context, run: &Path) -> Result<Vec<String>> {
         write_json(&path, &json)?;
     }
     Ok(doubts)
+}
+
+/// Labels by rendering the gaussians in every state.
+fn rendered_labels(
+    context: &Context,
+    frames: &[usize],
+    gaussians: &Gaussians,
+    found: &JointsFile,
+    diagonal: f64,
+) -> Result<Vec<Vec<u8>>> {
+    let progress = context.ui.stage("label");
+    let mut labeller = Labeller::new(gaussians, &found.labels, context.threads)?;
+    let tolerance = (0.02 * diagonal) as f32;
+    let mut labels = Vec::with_capacity(frames.len());
+    let mut state = usize::MAX;
+    for (k, &f) in frames.iter().enumerate() {
+        if context.recording.frames[f].state != state {
+            state = context.recording.frames[f].state;
+            labeller.pose(&found.tree, &found.tree.values_at(state))?;
+            progress.report(k, frames.len(), "")?;
+        }
+        labels.push(labeller.label(&context.view(f)?, tolerance)?);
+    }
+    Ok(labels)
 }
 
 #[cfg(feature = "mujoco")]
