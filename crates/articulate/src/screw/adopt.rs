@@ -3,7 +3,7 @@
 use super::evidence::{Evidence, Motion, Sample};
 use super::propose::{CROWD, Proposal};
 use super::refine::{self, refine};
-use super::scan::{Scan, agreement, scan, whole_range};
+use super::scan::{agreement, scan, whole_range};
 use hingecast_geom::{Joint, KinematicTree, Pose};
 
 /// Adds the proposal to the tree as a part; its screw and values are refined and asked again in turns, first with the
@@ -56,9 +56,17 @@ fn polish(evidence: &Evidence, tree: &mut KinematicTree, members: &[Sample], gat
     refine(evidence, tree, &members, &free, &settings, seed);
 }
 
-/// Asks every state anew for the last joint's value; keeps the old one unless another fits clearly better.
-fn rescan(evidence: &Evidence, tree: &mut KinematicTree, members: &[Sample], place: &[Pose]) -> Scan {
-    let joint = tree.joints.last().expect("a part was added");
+/// Another value must agree this much better with a state than the one that is held.
+const BETTER: f32 = 0.01;
+
+/// Asks every state anew for the last joint's value.
+fn rescan(evidence: &Evidence, tree: &mut KinematicTree, members: &[Sample], place: &[Pose]) {
+    let joint = tree.joints.last_mut().expect("a part was added");
+    joint.values = asked_again(evidence, joint, members, place);
+}
+
+/// The values of a joint that the states agree with best, for `members` of its child; the held ones unless others are better.
+pub fn asked_again(evidence: &Evidence, joint: &Joint, members: &[Sample], place: &[Pose]) -> Vec<f64> {
     // All samples in the parent's frame as of value 0.
     let samples: Vec<Sample> = members
         .iter()
@@ -71,13 +79,10 @@ fn rescan(evidence: &Evidence, tree: &mut KinematicTree, members: &[Sample], pla
     let mut found = scan(evidence, &samples, place, &joint.screw, range, 1.0 * evidence.lattice.voxel);
     for (s, parent) in place.iter().enumerate() {
         let held = agreement(evidence, s, &samples, &Motion::from(*parent * joint.screw.motion(joint.values[s])));
-        if found.scores[s] < held + 0.05 {
+        if found.scores[s] < held + BETTER {
             found.values[s] = joint.values[s];
-            found.scores[s] = held;
         }
     }
     let zero = found.values[0];
-    found.values.iter_mut().for_each(|v| *v -= zero);
-    tree.joints.last_mut().expect("a part was added").values.clone_from(&found.values);
-    found
+    found.values.iter().map(|v| v - zero).collect()
 }

@@ -20,6 +20,8 @@ pub struct Discovery {
     pub verdicts: Vec<Vec<Verdict>>,
     /// Share of the samples that no part explains.
     pub unexplained: f64,
+    /// Contradictions that a part has to remove to be worth having.
+    pub cost: f64,
 }
 
 /// Proposals that are refined before one is chosen.
@@ -83,7 +85,7 @@ pub fn discover(
     }
     let best = front.into_iter().chain(best).max_by(|a, b| a.merit.total_cmp(&b.merit)).expect("the first node");
     let unexplained = best.open.len() as f64 / evidence.samples.len().max(1) as f64;
-    Ok(Discovery { tree: best.tree, verdicts: best.verdicts, unexplained })
+    Ok(Discovery { tree: best.tree, verdicts: best.verdicts, unexplained, cost })
 }
 
 /// The `width` best ways to add a part.

@@ -1,6 +1,7 @@
 //! From a discovery to the final answer: labels of all samples, states brought into one frame by what stands still, all
 //! joints refined together.
 
+use super::adopt::asked_again;
 use super::discover::{Discovery, poses_of};
 use super::evidence::{Evidence, Motion, Sample, Verdict};
 use super::refine::{Report, Settings, refine};
@@ -37,6 +38,8 @@ pub fn settle(evidence: &mut Evidence, found: &Discovery, seed: u64) -> Settled 
     let mut tree = found.tree.clone();
     let mut rig = vec![Pose::IDENTITY; n_states];
     let mut labels = label(evidence, &found.verdicts);
+    ask_again(evidence, &mut tree, &labels, seed);
+    labels = label(evidence, &prune(evidence, &mut tree, found.cost));
     let free = vec![true; tree.joints.len()];
     let noisy = evidence.tolerance > SHARP * 4.0 * evidence.lattice.voxel;
     let mut report = Report::default();
@@ -86,6 +89,62 @@ pub fn label(evidence: &Evidence, verdicts: &[Vec<Verdict>]) -> Vec<u8> {
         (0..costs.len()).fold(0, |best, p| if costs[p][i] < costs[best][i] - 1e-3 { p } else { best }) as u8
     };
     (0..n).map(best).collect()
+}
+
+/// Asks all states for the value of every joint once more, now that all parts are known.
+fn ask_again(evidence: &mut Evidence, tree: &mut KinematicTree, labels: &[u8], seed: u64) {
+    let n_states = evidence.n_states();
+    for j in 0..tree.joints.len() {
+        let poses: Vec<Vec<Pose>> = (0..tree.parts.len()).map(|p| poses_of(tree, p, n_states)).collect();
+        let (child, parent) = (tree.joints[j].child, tree.joints[j].parent);
+        // What the other parts explain must not hold this one.
+        let others: Vec<Vec<Pose>> = (0..poses.len()).filter(|p| *p != child).map(|p| poses[p].clone()).collect();
+        evidence.mark_taken(&others);
+        let own = evidence.samples.iter().zip(labels).filter(|(_, l)| **l as usize == child);
+        let mut members: Vec<Sample> = own.map(|(s, _)| *s).collect();
+        fastrand::Rng::with_seed(seed ^ j as u64).shuffle(&mut members);
+        members.truncate(ASKING);
+        if !members.is_empty() {
+            tree.joints[j].values = asked_again(evidence, &tree.joints[j], &members, &poses[parent]);
+        }
+    }
+}
+
+/// Samples that ask for a value.
+const ASKING: usize = 500;
+
+/// Drops parts that the others make superfluous: those without children that explain less than they cost. Answers the
+/// verdicts of what is left.
+fn prune(evidence: &Evidence, tree: &mut KinematicTree, cost: f64) -> Vec<Vec<Verdict>> {
+    let n_states = evidence.n_states();
+    let mut verdicts: Vec<Vec<Verdict>> =
+        (0..tree.parts.len()).map(|p| evidence.judge(&poses_of(tree, p, n_states))).collect();
+    loop {
+        let fewest = |i: usize, without: usize| {
+            let others = (0..verdicts.len()).filter(|p| *p != without);
+            others.map(|p| verdicts[p][i].against.count_ones()).min().unwrap_or(0)
+        };
+        let gain = |p: usize| {
+            let each = |i: usize| (fewest(i, p) - fewest(i, usize::MAX)) as f64;
+            (0..verdicts[0].len()).map(each).sum::<f64>()
+        };
+        let leaf = |p: &usize| !tree.joints.iter().any(|j| j.parent == *p);
+        let weakest = (1..tree.parts.len()).filter(leaf).map(|p| (gain(p), p)).min_by(|a, b| a.0.total_cmp(&b.0));
+        let Some((_, part)) = weakest.filter(|w| w.0 < cost) else { return verdicts };
+        tree.joints.retain(|j| j.child != part);
+        for joint in &mut tree.joints {
+            joint.child -= usize::from(joint.child > part);
+            joint.parent -= usize::from(joint.parent > part);
+        }
+        tree.parts.remove(part);
+        for (k, name) in tree.parts.iter_mut().enumerate().skip(1) {
+            *name = format!("part_{k}");
+        }
+        for joint in &mut tree.joints {
+            joint.name = format!("joint_{}", joint.child);
+        }
+        verdicts.remove(part);
+    }
 }
 
 /// Neighbours whose costs smooth a label.
