@@ -140,7 +140,8 @@ pub struct Build {
     pub out: Option<PathBuf>,
     #[command(flatten)]
     pub settings: BuildSettings,
-    /// First stage to redo even if it is done: splat, motion, parts, joints or twin [default: the first that is missing].
+    /// First stage to redo even if it is done: parts, splat, joints or twin (with --method track: splat, motion, parts,
+    /// joints, twin) [default: the first that is missing].
     #[arg(long, value_name = "STAGE")]
     pub from: Option<String>,
     /// Last stage to run [default: twin].
@@ -211,6 +212,17 @@ pub struct Bench {
     /// Seed of cameras, play and noise of the recordings.
     #[arg(long, default_value_t = 0, value_name = "N")]
     pub recording_seed: u64,
+    /// Only parts and joints, under protocols of 25, 5 and 2 states with and without noise (see --protocol); the
+    /// method is screw. --size makes it quicker.
+    #[arg(long)]
+    pub joints: bool,
+    /// With --joints: 25x60, 25x60-d435, 5x48, 5x48-d435, 2x100 or 2x100-d435 (states x views); may be repeated
+    /// [default: all].
+    #[arg(long = "protocol", value_name = "NAME")]
+    pub protocols: Vec<String>,
+    /// With --joints: recordings of each object, with seeds from --recording-seed on.
+    #[arg(long, default_value_t = 1, value_name = "N")]
+    pub seeds: u64,
     /// Delete each recording once it is evaluated (56 MB per object at the defaults).
     #[arg(long)]
     pub tidy: bool,

@@ -31,7 +31,7 @@ fn every_help_text_says_defaults_and_units() {
         words.iter().for_each(|w| assert!(text.contains(w), "{verb} --help does not say '{w}'"));
     };
     says("synth", &["pixels", "radians", "scene units", "deg", "mm"]);
-    says("build", &["kg/m^3", "splat, motion, parts, joints or twin"]);
+    says("build", &["kg/m^3", "parts, splat, joints or twin"]);
     says("eval", &["degrees", "share of the", "dB"]);
     says("bench", &["MB", "pixels"]);
 }

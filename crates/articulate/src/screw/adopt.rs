@@ -38,9 +38,12 @@ pub fn adopt(evidence: &Evidence, tree: &mut KinematicTree, p: &Proposal, seed: 
             break;
         }
         polish(evidence, tree, &members, gate * voxel, 4, seed);
+        let all = members.clone();
         fastrand::Rng::with_seed(seed).shuffle(&mut members);
         members.truncate(2 * CROWD);
         rescan(evidence, tree, &members, &place);
+        // Asking answers in steps of the grid.
+        polish(evidence, tree, &all, gate * voxel, 4, seed);
     }
     let joint = tree.joints.last_mut().expect("just pushed");
     joint.limits = joint.values.iter().fold([0.0f64; 2], |l, v| [l[0].min(*v), l[1].max(*v)]);

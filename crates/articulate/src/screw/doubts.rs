@@ -11,16 +11,18 @@ use std::collections::HashMap;
 /// Samples count as independent evidence in groups of this size: neighbours share their noise.
 const CORRELATED: f64 = 25.0;
 /// Log-likelihood ratio (nats) below which a rival is not refuted.
-const REFUTED: f64 = 10.0;
+pub const REFUTED: f64 = 10.0;
 /// Standard deviations worth mentioning: axis [deg], pivot [share of the object's extent].
 const LOOSE_AXIS_DEG: f64 = 1.0;
 const LOOSE_PIVOT: f64 = 0.01;
 /// The covariance counts rows that share noise and correspondences as if they did not.
 const OPTIMISTIC: f64 = 5.0;
+/// A hinge that turns less than this in all, radians, moves its part like a slide.
+const SAME_TURN: f64 = 0.02;
 /// A second piece of at least this share of its part is mentioned.
 const PIECE: f64 = 0.2;
-/// Pieces farther apart than this many voxels are separate.
-const GAP: i32 = 4;
+/// Pieces farther apart than one to two cells of this many voxels are separate.
+const GAP: f32 = 1.5;
 /// Share of samples that may stay unexplained silently.
 const UNEXPLAINED: f64 = 0.005;
 /// Share of the part's samples that a state must confirm.
@@ -35,8 +37,14 @@ pub struct Rival {
     pub nats: f64,
 }
 
-/// Doubts, gravest first, and the rivals that were tried.
-pub fn doubts(evidence: &Evidence, found: &Settled, unexplained: f64, seed: u64) -> (Vec<String>, Vec<Rival>) {
+/// Doubts, gravest first, and the rivals that were tried. `clouds`: the part of every point of every state's cloud.
+pub fn doubts(
+    evidence: &Evidence,
+    found: &Settled,
+    clouds: &[Vec<u8>],
+    unexplained: f64,
+    seed: u64,
+) -> (Vec<String>, Vec<Rival>) {
     let mut out = Vec::new();
     let mut rivals = Vec::new();
     let tree = &found.tree;
@@ -46,6 +54,7 @@ pub fn doubts(evidence: &Evidence, found: &Settled, unexplained: f64, seed: u64)
     for (j, joint) in tree.joints.iter().enumerate() {
         let members: Vec<(Sample, usize)> = members(evidence, found, joint.child);
         let (rival, nats) = rival(evidence, tree, j, &members, seed);
+        let rival = rival.joints[j].screw.kind;
         if nats < REFUTED {
             out.push(format!(
                 "undecidable: '{}' may as well be {}: it moved too little to tell ({nats:.1} nats apart; 10 would do)",
@@ -62,7 +71,7 @@ pub fn doubts(evidence: &Evidence, found: &Settled, unexplained: f64, seed: u64)
         if pivot > LOOSE_PIVOT * evidence.extent() as f64 {
             out.push(format!("joint '{}': the depth says where its axis lies only to {pivot:.3} units", joint.name));
         }
-        if let Some(share) = second_piece(evidence, found, joint, &members) {
+        if let Some(share) = second_piece(evidence, found, clouds, joint) {
             out.push(format!(
                 "'{}' has two pieces that do not touch ({:.0} % of it is the second) and always moved together: if they \
                  are two parts, record them moving one at a time",
@@ -101,8 +110,14 @@ fn members(evidence: &Evidence, found: &Settled, part: usize) -> Vec<(Sample, us
     own.map(|(s, _)| (*s, part)).collect()
 }
 
-/// The other type, fitted as well as it can be, and how many nats it is behind.
-fn rival(evidence: &Evidence, tree: &KinematicTree, j: usize, members: &[(Sample, usize)], seed: u64) -> (JointKind, f64) {
+/// The tree with joint `j` of the other type, fitted as well as it can be, and how many nats it is behind.
+pub fn rival(
+    evidence: &Evidence,
+    tree: &KinematicTree,
+    j: usize,
+    members: &[(Sample, usize)],
+    seed: u64,
+) -> (KinematicTree, f64) {
     let voxel = evidence.lattice.voxel as f64;
     let settings = Settings { gates: [0.6 * voxel, 0.6 * voxel], rounds: 4, partners: 6 };
     let mut free = vec![false; tree.joints.len()];
@@ -118,7 +133,11 @@ fn rival(evidence: &Evidence, tree: &KinematicTree, j: usize, members: &[(Sample
     let independent = members.len() as f64 / CORRELATED;
     // A hinge has two unknowns more than a slide.
     let extra = independent.max(2.0).ln() * if kind == JointKind::Prismatic { -1.0 } else { 1.0 };
-    (kind, 0.5 * independent * ((theirs.cost + floor) / (own.cost + floor)).ln() + extra)
+    // A hinge that hardly turns is the slide in other words, not a rival.
+    let turn = other.joints[j].values.iter().fold(0.0, |m: f64, v| m.max(v.abs()));
+    let same = if kind.turns() && turn < SAME_TURN { REFUTED } else { 0.0 };
+    let nats = 0.5 * independent * ((theirs.cost + floor) / (own.cost + floor)).ln() + extra + same;
+    (other, nats)
 }
 
 /// Turns a hinge into the slide that moves the part's middle alike, and a slide into a hinge far away.
@@ -148,19 +167,22 @@ fn imitate(joint: &mut Joint, members: &[(Sample, usize)]) -> JointKind {
 }
 
 /// Share of the second largest piece of a part, when it is large and apart from the largest.
-fn second_piece(evidence: &Evidence, found: &Settled, joint: &Joint, members: &[(Sample, usize)]) -> Option<f64> {
-    // All samples where the first state has them.
-    let back: Vec<Pose> = (0..evidence.n_states())
-        .map(|s| found.tree.poses_at(s)[joint.child].inverse())
-        .collect();
-    let cell = GAP as f32 * evidence.lattice.voxel;
+fn second_piece(evidence: &Evidence, found: &Settled, clouds: &[Vec<u8>], joint: &Joint) -> Option<f64> {
+    // All points where the first state has them.
+    let cell = GAP * evidence.lattice.voxel;
     let mut cells: HashMap<IVec3, usize> = HashMap::new();
-    for (s, _) in members {
-        let x: Vec3 = back[s.state].apply(s.point.as_dvec3()).as_vec3();
-        *cells.entry((x / cell).floor().as_ivec3()).or_insert(0) += 1;
+    for (state, labels) in clouds.iter().enumerate() {
+        let back = found.tree.poses_at(state)[joint.child].inverse();
+        let own = evidence.clouds[state].points.iter().zip(labels).filter(|(_, l)| **l as usize == joint.child);
+        for (x, _) in own {
+            let x: Vec3 = back.apply(x.as_dvec3()).as_vec3();
+            *cells.entry((x / cell).floor().as_ivec3()).or_insert(0) += 1;
+        }
     }
-    // Sparse cells are stray labels.
-    cells.retain(|_, n| *n >= 3);
+    // A cell that only one state in five fills holds stray labels.
+    let least = clouds.len().div_ceil(5);
+    cells.retain(|_, n| *n >= least);
+    let total: usize = cells.values().sum();
     let mut sizes = Vec::new();
     while let Some(start) = cells.keys().copied().min_by_key(|c| c.to_array()) {
         let (mut stack, mut size) = (vec![start], 0);
@@ -177,7 +199,7 @@ fn second_piece(evidence: &Evidence, found: &Settled, joint: &Joint, members: &[
         sizes.push(size);
     }
     sizes.sort_unstable_by(|a, b| b.cmp(a));
-    let share = *sizes.get(1)? as f64 / members.len() as f64;
+    let share = *sizes.get(1)? as f64 / total as f64;
     (share > PIECE).then_some(share)
 }
 

@@ -106,8 +106,8 @@ pub fn run<E: From<Cancelled>>(
     for (views, rig) in cameras.iter_mut().zip(&settled.rig) {
         views.iter_mut().for_each(|c| *c = *c * rig.inverse());
     }
-    let (doubts, rivals) = doubts::doubts(&evidence, &settled, discovery.unexplained, seed);
     let labels = settle::label_clouds(&evidence, &settled.tree);
+    let (doubts, rivals) = doubts::doubts(&evidence, &settled, &labels, discovery.unexplained, seed);
     let of_state = |(state, own): (usize, &Vec<u8>)| -> Vec<Labelled> {
         let points = &evidence.clouds[state].points;
         points.iter().zip(own).map(|(point, part)| Labelled { state, point: *point, part: *part }).collect()

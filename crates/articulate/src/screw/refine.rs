@@ -296,3 +296,70 @@ fn centre_pivots(tree: &mut KinematicTree, members: &[(Sample, usize)]) {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use hingecast_geom::{Joint, Screw};
+
+    /// A slide on a hinge.
+    fn chain_tree() -> KinematicTree {
+        let joint = |parent, kind, axis: DVec3, pivot, values: [f64; 2]| Joint {
+            name: "j".into(),
+            parent,
+            child: parent + 1,
+            screw: Screw { kind, axis: axis.normalize(), pivot },
+            values: values.to_vec(),
+            limits: [0.0, 1.0],
+        };
+        KinematicTree {
+            parts: vec!["a".into(), "b".into(), "c".into()],
+            joints: vec![
+                joint(0, JointKind::Revolute, DVec3::new(0.2, 0.1, 1.0), DVec3::new(0.3, -0.1, 0.2), [0.2, 0.9]),
+                joint(1, JointKind::Prismatic, DVec3::new(1.0, 0.3, -0.2), DVec3::new(0.1, 0.5, 0.0), [0.1, 0.4]),
+            ],
+        }
+    }
+
+    /// The twists against central differences of where a carried point ends, for every parameter of both joints.
+    #[test]
+    fn twists_are_the_derivatives_of_the_motion() {
+        let tree = chain_tree();
+        let x = DVec3::new(0.7, -0.4, 0.9);
+        let carried = |tree: &KinematicTree| (tree.poses_at(1)[2] * tree.poses_at(0)[2].inverse()).apply(x);
+        let poses = [tree.poses_at(0), tree.poses_at(1)];
+        let m = poses[1][2] * poses[0][2].inverse();
+        let h = 1e-6;
+        for j in 0..2 {
+            let (there, here) = (twists(&tree, j, 0, &poses[0]), twists(&tree, j, 1, &poses[1]));
+            let n_shape = if j == 0 { 4 } else { 2 };
+            for k in 0..n_shape + 2 {
+                let moved = |step: f64| {
+                    let mut tree = tree.clone();
+                    let size = n_shape + 1;
+                    let slot = Slot { shape: 0, n_shape, values: n_shape };
+                    let mut by = DVector::zeros(size + 1);
+                    // The last two parameters: the value at state 1, and (by hand) that at state 0.
+                    if k < size {
+                        by[k] = step;
+                    } else {
+                        tree.joints[j].values[0] += step;
+                    }
+                    let slots: Vec<Option<Slot>> = (0..2).map(|i| (i == j).then_some(slot)).collect();
+                    update(&mut tree, &slots, &by);
+                    carried(&tree)
+                };
+                let numeric = (moved(h) - moved(-h)) / (2.0 * h);
+                let index = if k < n_shape { k } else { 4 };
+                let analytic = if k < n_shape {
+                    here[index].at(m.apply(x)) - m.rotate(there[index].at(x))
+                } else if k == n_shape {
+                    here[4].at(m.apply(x))
+                } else {
+                    -m.rotate(there[4].at(x))
+                };
+                assert!((numeric - analytic).length() < 1e-7, "joint {j} parameter {k}: {numeric} {analytic}");
+            }
+        }
+    }
+}

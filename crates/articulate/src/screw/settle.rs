@@ -3,6 +3,7 @@
 
 use super::adopt::asked_again;
 use super::discover::{Discovery, poses_of};
+use super::doubts::{REFUTED, rival};
 use super::evidence::{Evidence, Motion, Sample, Verdict};
 use super::refine::{Report, Settings, refine};
 use crate::icp::{self, Surface};
@@ -40,6 +41,7 @@ pub fn settle(evidence: &mut Evidence, found: &Discovery, seed: u64) -> Settled 
     let mut labels = label(evidence, &found.verdicts);
     ask_again(evidence, &mut tree, &labels, seed);
     labels = label(evidence, &prune(evidence, &mut tree, found.cost));
+    slides(evidence, &mut tree, &labels, seed);
     let free = vec![true; tree.joints.len()];
     let noisy = evidence.tolerance > SHARP * 4.0 * evidence.lattice.voxel;
     let mut report = Report::default();
@@ -106,6 +108,26 @@ fn ask_again(evidence: &mut Evidence, tree: &mut KinematicTree, labels: &[u8], s
         members.truncate(ASKING);
         if !members.is_empty() {
             tree.joints[j].values = asked_again(evidence, &tree.joints[j], &members, &poses[parent]);
+        }
+    }
+}
+
+/// A hinge this many extents away from the object may be a slide.
+const FAR: f64 = 2.0;
+
+/// Turns hinges that lie far away into slides where a slide explains the recording as well.
+fn slides(evidence: &Evidence, tree: &mut KinematicTree, labels: &[u8], seed: u64) {
+    let centre = evidence.samples.iter().map(|s| s.point.as_dvec3()).sum::<DVec3>() / evidence.samples.len() as f64;
+    for j in 0..tree.joints.len() {
+        let joint = &tree.joints[j];
+        if !joint.screw.kind.turns() || joint.screw.distance(centre) < FAR * evidence.extent() as f64 {
+            continue;
+        }
+        let own = evidence.samples.iter().zip(labels).filter(|(_, l)| **l as usize == joint.child);
+        let members: Vec<(Sample, usize)> = own.map(|(s, _)| (*s, joint.child)).collect();
+        let (slide, nats) = rival(evidence, tree, j, &members, seed);
+        if nats < REFUTED {
+            *tree = slide;
         }
     }
 }

@@ -2,6 +2,7 @@
 //! state. Roots match roots. Never on joint errors: that would hide bad parts.
 
 use super::surfaces::chamfer;
+use glam::Vec3;
 use hingecast_geom::{KinematicTree, TriMesh};
 use rayon::prelude::*;
 
@@ -12,13 +13,24 @@ pub fn match_parts(
     found_tree: &KinematicTree,
     true_tree: &KinematicTree,
 ) -> Vec<Option<usize>> {
+    let sample = |m: &TriMesh| m.sample_surface(3000, 1).into_iter().map(|s| s.0).collect::<Vec<_>>();
+    let points = |meshes: &[TriMesh]| meshes.iter().map(sample).collect::<Vec<_>>();
+    match_points(&points(found), &points(truth), found_tree, true_tree)
+}
+
+/// The same from points on the parts' surfaces.
+pub fn match_points(
+    found: &[Vec<Vec3>],
+    truth: &[Vec<Vec3>],
+    found_tree: &KinematicTree,
+    true_tree: &KinematicTree,
+) -> Vec<Option<usize>> {
     let movable = |tree: &KinematicTree, n: usize| (0..n).filter(|&p| tree.joint_of(p).is_some()).collect::<Vec<_>>();
     let (rows, columns) = (movable(true_tree, truth.len()), movable(found_tree, found.len()));
-    let sample = |m: &TriMesh| m.sample_surface(3000, 1).into_iter().map(|s| s.0).collect::<Vec<_>>();
-    let from: Vec<_> = rows.iter().map(|&t| sample(&truth[t])).collect();
-    let to: Vec<_> = columns.iter().map(|&f| sample(&found[f])).collect();
-    let cost: Vec<Vec<f64>> =
-        from.par_iter().map(|a| to.iter().map(|b| chamfer(a, b).unwrap_or(1e9)).collect()).collect();
+    let cost: Vec<Vec<f64>> = rows
+        .par_iter()
+        .map(|&t| columns.iter().map(|&f| chamfer(&truth[t], &found[f]).unwrap_or(1e9)).collect())
+        .collect();
     let mut out = vec![None; truth.len()];
     for (row, column) in assignment(&cost).into_iter().enumerate() {
         out[rows[row]] = column.map(|c| columns[c]);

@@ -3,6 +3,7 @@
 
 pub mod joints;
 pub mod matching;
+pub mod parts;
 pub mod pictures;
 pub mod surfaces;
 

@@ -52,6 +52,23 @@ fn load_samples(run: &Path) -> Result<Vec<Labelled>> {
     Ok(table.data.chunks_exact(COLUMNS.len()).map(row).collect())
 }
 
+/// At most `most` points of every part's surface, where the first state has it.
+pub fn canonical_points(run: &Path, tree: &KinematicTree, most: usize) -> Result<Vec<Vec<Vec3>>> {
+    let mut out = vec![Vec::new(); tree.parts.len()];
+    let n_states = tree.joints.first().map_or(1, |j| j.values.len());
+    let back: Vec<Vec<Pose>> =
+        (0..n_states).map(|s| tree.poses_at(s).iter().map(Pose::inverse).collect()).collect();
+    for s in load_samples(run)? {
+        let pose = &back[s.state.min(n_states - 1)][s.part as usize];
+        out[s.part as usize].push(pose.apply(s.point.as_dvec3()).as_vec3());
+    }
+    for points in &mut out {
+        let stride = points.len().div_ceil(most).max(1);
+        *points = points.iter().step_by(stride).copied().collect();
+    }
+    Ok(out)
+}
+
 /// Pixels of a view as the search for parts wants them.
 fn depth_view(view: &View) -> cloud::DepthView {
     let class = |i: usize| match (view.usable[i], view.mask[i], view.depth[i] > 0.0) {

@@ -55,6 +55,9 @@ pub fn run(session: &Session, args: &Bench) -> Result<Outcome> {
     for name in &names {
         ArticulatedObject::resolve(name)?;
     }
+    if args.joints {
+        return super::grid::run(session, args, &names);
+    }
     let synth_config = synth::config(&args.synth, args.recording_seed, true)?;
     let build_config = build::config(&args.build)?;
     let before: Option<Vec<Evaluation>> = args.against.as_deref().map(read_json).transpose()?;
@@ -108,7 +111,7 @@ fn one(
 }
 
 /// Records, unless the same object lies there recorded with the same settings.
-fn record_once(session: &Session, name: &str, config: &SynthConfig, recording: &Path) -> Result<()> {
+pub fn record_once(session: &Session, name: &str, config: &SynthConfig, recording: &Path) -> Result<()> {
     let note = recording.with_extension("synth.json");
     let settings = serde_json::to_value(config).expect("plain data");
     let noted: Option<serde_json::Value> = std::fs::read(&note).ok().and_then(|b| serde_json::from_slice(&b).ok());

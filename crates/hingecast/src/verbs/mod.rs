@@ -6,6 +6,7 @@ mod check;
 mod demo;
 mod doctor;
 mod eval;
+mod grid;
 mod import;
 mod synth;
 mod table;

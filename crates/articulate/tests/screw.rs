@@ -1,0 +1,203 @@
+//! `screw::run` on scenes of boxes whose depth is computed exactly: the right parts, types, parents, axes and values.
+
+use glam::{DVec2, DVec3, Vec3};
+use hingecast_articulate::ArticulateError;
+use hingecast_articulate::screw::cloud::{BACKGROUND, DepthView, OBJECT};
+use hingecast_articulate::screw::{Config, Found, run};
+use hingecast_geom::{Camera, Joint, JointKind, KinematicTree, Pose, Progress, Screw};
+
+/// Boxes of one part, canonical frame.
+type Boxes = Vec<(DVec3, DVec3)>;
+
+const SIZE: usize = 128;
+
+/// Depth along a ray of the nearest box; None = background.
+fn hit(origin: DVec3, ray: DVec3, parts: &[(Boxes, Pose)]) -> Option<f64> {
+    let mut nearest: Option<f64> = None;
+    for (boxes, pose) in parts {
+        let back = pose.inverse();
+        let (o, d) = (back.apply(origin), back.rotate(ray));
+        for (lo, hi) in boxes {
+            let (a, b) = ((*lo - o) / d, (*hi - o) / d);
+            let (near, far) = (a.min(b).max_element(), a.max(b).min_element());
+            if near < far && near > 0.0 && nearest.is_none_or(|n| near < n) {
+                nearest = Some(near);
+            }
+        }
+    }
+    nearest
+}
+
+fn views(parts: &[(Boxes, Pose)], count: usize) -> Vec<DepthView> {
+    (0..count)
+        .map(|k| {
+            let (turn, height) = (k as f64 * 2.399, 0.15 + 0.8 * (k as f64 + 0.5) / count as f64);
+            let flat = (1.0 - height * height).sqrt();
+            let eye = DVec3::new(flat * turn.cos(), flat * turn.sin(), height) * 3.2;
+            let camera = Camera::look_at(eye, DVec3::new(0.0, 0.0, 0.2), DVec3::Z, SIZE, SIZE, 0.75);
+            let (mut depth, mut class) = (vec![0.0; SIZE * SIZE], vec![BACKGROUND; SIZE * SIZE]);
+            for i in 0..SIZE * SIZE {
+                let uv = DVec2::new((i % SIZE) as f64 + 0.5, (i / SIZE) as f64 + 0.5);
+                if let Some(z) = hit(eye, camera.ray(uv), parts) {
+                    (depth[i], class[i]) = (z as f32, OBJECT);
+                }
+            }
+            DepthView { camera, depth, class }
+        })
+        .collect()
+}
+
+/// Records the tree in the states of its joints' values and looks for its parts.
+fn find(boxes: &[Boxes], tree: &KinematicTree) -> Found {
+    let n_states = tree.joints.first().map_or(3, |j| j.values.len());
+    let mut state = |s: usize| {
+        let parts: Vec<_> = boxes.iter().cloned().zip(tree.poses_at(s)).collect();
+        Ok::<_, ArticulateError>(views(&parts, 24))
+    };
+    let extent = (Vec3::new(-1.0, -1.0, -0.4), Vec3::new(1.0, 1.0, 1.0));
+    let config = Config { cells: 80, ..Config::default() };
+    run(n_states, extent, &mut state, &config, 0, &Progress::default()).unwrap()
+}
+
+fn joint(parent: usize, child: usize, kind: JointKind, axis: DVec3, pivot: DVec3, values: &[f64]) -> Joint {
+    let screw = Screw { kind, axis, pivot };
+    Joint { name: format!("j{child}"), parent, child, screw, values: values.to_vec(), limits: [0.0, 1.0] }
+}
+
+fn tree(joints: Vec<Joint>) -> KinematicTree {
+    KinematicTree { parts: (0..=joints.len()).map(|i| format!("p{i}")).collect(), joints }
+}
+
+fn cuboid(lo: [f64; 3], hi: [f64; 3]) -> (DVec3, DVec3) {
+    (lo.into(), hi.into())
+}
+
+/// A case with a door (with a handle) on the left and a drawer on the right.
+fn cupboard() -> Vec<Boxes> {
+    vec![
+        vec![
+            cuboid([-0.3, -0.7, -0.3], [0.5, 0.7, -0.26]),
+            cuboid([-0.3, -0.7, 0.36], [0.5, 0.7, 0.4]),
+            cuboid([-0.3, -0.7, -0.26], [0.5, -0.66, 0.36]),
+            cuboid([-0.3, 0.66, -0.26], [0.5, 0.7, 0.36]),
+            cuboid([0.46, -0.66, -0.26], [0.5, 0.66, 0.36]),
+            cuboid([-0.3, -0.02, -0.26], [0.46, 0.02, 0.36]),
+            cuboid([-0.35, 0.01, 0.16], [-0.3, 0.7, 0.4]),
+        ],
+        vec![cuboid([-0.35, -0.7, -0.3], [-0.3, -0.01, 0.4]), cuboid([-0.42, -0.12, 0.0], [-0.35, -0.08, 0.15])],
+        vec![
+            cuboid([-0.35, 0.01, -0.3], [-0.3, 0.7, 0.15]),
+            cuboid([-0.3, 0.05, -0.25], [0.3, 0.63, -0.2]),
+            cuboid([-0.3, 0.05, -0.2], [0.3, 0.09, 0.1]),
+            cuboid([-0.3, 0.59, -0.2], [0.3, 0.63, 0.1]),
+        ],
+    ]
+}
+
+/// The found joint nearest to a true one, by axis, line and values, must be the same joint.
+fn assert_found(found: &Found, truth: &Joint) -> usize {
+    let off = |j: &Joint| {
+        let sign = if j.screw.axis.dot(truth.screw.axis) < 0.0 { -1.0 } else { 1.0 };
+        let values = j.values.iter().zip(&truth.values);
+        let values = values.map(|(f, t)| (sign * f - (t - truth.values[0])).abs()).fold(0.0, f64::max);
+        let line = if truth.screw.kind.turns() { j.screw.distance(truth.screw.foot(j.screw.pivot)) } else { 0.0 };
+        let axis = j.screw.axis.cross(truth.screw.axis).length();
+        if j.screw.kind == truth.screw.kind { axis.max(line).max(values) } else { f64::INFINITY }
+    };
+    let best = (0..found.tree.joints.len())
+        .min_by(|a, b| off(&found.tree.joints[*a]).total_cmp(&off(&found.tree.joints[*b])))
+        .expect("no joint was found");
+    assert!(off(&found.tree.joints[best]) < 5e-3, "{truth:?}\nnearest: {:?}", found.tree.joints[best]);
+    best
+}
+
+#[test]
+fn a_door_and_a_drawer() {
+    let hinge = DVec3::new(-0.35, -0.7, 0.0);
+    let joints = vec![
+        joint(0, 1, JointKind::Revolute, DVec3::Z, hinge, &[0.0, 0.5, 1.2, 1.2, 0.9]),
+        joint(0, 2, JointKind::Prismatic, DVec3::NEG_X, DVec3::ZERO, &[0.0, 0.0, 0.1, 0.3, 0.45]),
+    ];
+    let tree = tree(joints);
+    let found = find(&cupboard(), &tree);
+    assert_eq!(found.tree.parts.len(), 3, "{:?}", found.tree);
+    for truth in &tree.joints {
+        assert_found(&found, truth);
+    }
+    assert!(found.doubts.is_empty(), "{:?}", found.doubts);
+}
+
+#[test]
+fn a_door_and_a_drawer_in_two_states() {
+    let hinge = DVec3::new(-0.35, -0.7, 0.0);
+    let tree = tree(vec![
+        joint(0, 1, JointKind::Revolute, DVec3::Z, hinge, &[0.0, 1.3]),
+        joint(0, 2, JointKind::Prismatic, DVec3::NEG_X, DVec3::ZERO, &[0.0, 0.4]),
+    ]);
+    let found = find(&cupboard(), &tree);
+    assert_eq!(found.tree.parts.len(), 3, "{:?}", found.tree);
+    for truth in &tree.joints {
+        assert_found(&found, truth);
+    }
+}
+
+/// A desk lamp: an arm on a foot, a head on the arm.
+#[test]
+fn a_joint_on_a_joint() {
+    let boxes = vec![
+        vec![cuboid([-0.3, -0.2, -0.3], [0.3, 0.2, -0.22]), cuboid([-0.06, -0.14, -0.22], [0.06, -0.08, 0.0])],
+        vec![cuboid([-0.05, -0.08, -0.1], [0.05, -0.02, 0.55])],
+        vec![cuboid([-0.08, -0.02, 0.42], [0.4, 0.1, 0.52]), cuboid([0.25, -0.06, 0.3], [0.4, 0.14, 0.42])],
+    ];
+    let tree = tree(vec![
+        joint(0, 1, JointKind::Revolute, DVec3::Y, DVec3::new(0.0, 0.0, -0.05), &[0.0, 0.3, 0.6, 0.4, -0.2]),
+        joint(1, 2, JointKind::Revolute, DVec3::Y, DVec3::new(0.0, 0.0, 0.47), &[0.0, 0.5, 0.2, -0.3, 0.6]),
+    ]);
+    let found = find(&boxes, &tree);
+    assert_eq!(found.tree.parts.len(), 3, "{:?}", found.tree);
+    let (arm, head) = (assert_found(&found, &tree.joints[0]), assert_found(&found, &tree.joints[1]));
+    assert_eq!(found.tree.joints[arm].parent, 0);
+    assert_eq!(found.tree.joints[head].parent, found.tree.joints[arm].child);
+}
+
+#[test]
+fn what_never_moves_is_one_part() {
+    let tree = KinematicTree { parts: vec!["all".into()], joints: Vec::new() };
+    let all = vec![cupboard().concat()];
+    let found = find(&all, &tree);
+    assert!(found.tree.joints.is_empty());
+    assert!(found.doubts[0].contains("nothing moves"), "{:?}", found.doubts);
+}
+
+/// Two drawers pulled together cannot be told apart, and the doubt says so.
+#[test]
+fn drawers_that_move_together_are_one_part_with_a_doubt() {
+    let mut boxes = cupboard();
+    let shift = DVec3::new(0.0, -0.71, 0.0);
+    boxes[1] = boxes[2].iter().map(|(lo, hi)| (*lo + shift, *hi + shift)).collect();
+    // A gap between the fronts: the pieces do not touch.
+    boxes[1][0].1.y = -0.15;
+    boxes[2][0].0.y = 0.15;
+    let values = [0.0, 0.15, 0.4];
+    let tree = tree(vec![
+        joint(0, 1, JointKind::Prismatic, DVec3::NEG_X, DVec3::ZERO, &values),
+        joint(0, 2, JointKind::Prismatic, DVec3::NEG_X, DVec3::ZERO, &values),
+    ]);
+    let found = find(&boxes, &tree);
+    assert_eq!(found.tree.joints.len(), 1, "{:?}", found.tree);
+    assert_found(&found, &tree.joints[0]);
+    assert!(found.doubts.iter().any(|d| d.contains("always moved together")), "{:?}", found.doubts);
+}
+
+/// Whatever the joint's value is there, the first state counts as 0.
+#[test]
+fn the_first_state_is_zero() {
+    let hinge = DVec3::new(-0.35, -0.7, 0.0);
+    let joints = vec![joint(0, 1, JointKind::Revolute, DVec3::Z, hinge, &[0.4, 0.0, 1.2])];
+    let mut boxes = cupboard();
+    let drawer = boxes.pop().unwrap();
+    boxes[0].extend(drawer);
+    let found = find(&boxes, &tree(joints));
+    assert_eq!(found.tree.joints.len(), 1);
+    assert_eq!(found.tree.joints[0].values[0], 0.0);
+}
