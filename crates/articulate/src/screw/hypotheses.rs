@@ -42,6 +42,8 @@ const FIRST: usize = 10;
 const FIRST_FIT: usize = 7;
 /// Samples that count for the score.
 const JURY: usize = 250;
+/// Points by which motions are told apart.
+const MARKS: usize = 8;
 /// Angles tried where the normal is parallel to the axis.
 const OPEN_ANGLES: usize = 48;
 
@@ -81,6 +83,8 @@ impl Duel<'_> {
         rng.shuffle(&mut jury);
         jury.truncate(JURY);
         let voxel = self.space.lattice.voxel;
+        // Where these go tells motions apart.
+        let marks: Vec<Vec3> = anchors.iter().take(MARKS).map(|&a| self.source[a].point).collect();
         let mut found: Vec<Hypothesis> = anchors
             .par_iter()
             .map(|&a| {
@@ -94,8 +98,7 @@ impl Duel<'_> {
                 let reach = near.len().min(4 * FIRST);
                 let first: Vec<usize> = near[..reach].iter().step_by(4).copied().collect();
                 let need = FIRST_FIT * first.len() / FIRST;
-                let mut best: Vec<Hypothesis> = Vec::new();
-                let mut worst = 0;
+                let mut best = Distinct::new(&marks, 3.0 * voxel, keep);
                 let mut consider = |screw: Screw, q: f64| {
                     let m = Motion::from(screw.motion(q));
                     let mut misses = 0;
@@ -106,28 +109,17 @@ impl Duel<'_> {
                         }
                     }
                     let score = jury.iter().filter(|&&i| self.fits(&m, &self.source[i])).count();
-                    if score > worst {
-                        best.push(Hypothesis { screw, q, score });
-                        if best.len() >= 4 * keep {
-                            best.sort_by(|a, b| b.score.cmp(&a.score));
-                            best.truncate(keep);
-                            worst = best[keep - 1].score;
-                        }
-                    }
+                    best.offer(Hypothesis { screw, q, score });
                 };
                 for (y, m) in &targets {
                     candidates(anchor.point, anchor.normal, *y, *m, voxel, &mut consider);
                 }
-                best.sort_by(|a, b| b.score.cmp(&a.score));
-                best.truncate(keep);
-                best
+                best.sorted()
             })
             .collect::<Vec<_>>()
             .concat();
         found.sort_by(|a, b| b.score.cmp(&a.score));
-        found.truncate(4 * keep);
-        let extent: Vec<Vec3> = anchors.iter().map(|&a| self.source[a].point).collect();
-        distinct(found, &extent, 3.0 * voxel, keep)
+        distinct(found, &marks, 3.0 * voxel, keep)
     }
 }
 
@@ -191,6 +183,46 @@ fn spread(samples: &[Sample], count: usize, rng: &mut fastrand::Rng) -> Vec<usiz
         next = (0..samples.len()).max_by(|a, b| distance[*a].total_cmp(&distance[*b]).then(b.cmp(a))).unwrap_or(0);
     }
     out
+}
+
+/// The best hypotheses of a stream, none nearly like another.
+struct Distinct<'a> {
+    marks: &'a [Vec3],
+    apart: f32,
+    keep: usize,
+    held: Vec<(Hypothesis, Vec<Vec3>)>,
+}
+
+impl<'a> Distinct<'a> {
+    fn new(marks: &'a [Vec3], apart: f32, keep: usize) -> Self {
+        Self { marks, apart, keep, held: Vec::new() }
+    }
+
+    fn offer(&mut self, h: Hypothesis) {
+        let full = self.held.len() == self.keep;
+        if full && self.held.iter().all(|o| o.0.score >= h.score) {
+            return;
+        }
+        let m = Motion::from(h.screw.motion(h.q));
+        let ends: Vec<Vec3> = self.marks.iter().map(|x| m.apply(*x)).collect();
+        let same = |o: &(Hypothesis, Vec<Vec3>)| {
+            o.0.screw.kind == h.screw.kind && o.1.iter().zip(&ends).all(|(a, b)| a.distance(*b) < self.apart)
+        };
+        if let Some(like) = self.held.iter_mut().find(|o| same(o)) {
+            if h.score > like.0.score {
+                *like = (h, ends);
+            }
+        } else if !full {
+            self.held.push((h, ends));
+        } else if let Some(worst) = self.held.iter_mut().min_by_key(|o| o.0.score) {
+            *worst = (h, ends);
+        }
+    }
+
+    fn sorted(mut self) -> Vec<Hypothesis> {
+        self.held.sort_by(|a, b| b.0.score.cmp(&a.0.score));
+        self.held.into_iter().map(|h| h.0).collect()
+    }
 }
 
 /// Leaves out hypotheses that move `points` nearly like a better one.
