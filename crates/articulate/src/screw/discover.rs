@@ -6,7 +6,7 @@
 //! Gauss-Newton, and the one that removes the most contradictions, measured within the noise, becomes a part.
 
 use super::adopt::adopt;
-use super::evidence::{Evidence, Motion, Sample, Verdict};
+use super::evidence::{Evidence, Motion, Sample, Verdict, contradictions};
 use super::jury::Jury;
 use super::plausible::plausibility;
 use super::propose::{Proposal, propose};
@@ -37,8 +37,9 @@ const BEAM: usize = 4;
 const MANY_STATES: usize = 4;
 
 /// What a part costs, share of all contradictions that a single rigid thing would have: its screw and its values have to be
-/// paid for by what they explain.
+/// paid for by what they explain. With few states more is explained by chance.
 const PART_COST: f64 = 0.015;
+const PART_COST_CHANCE: f64 = 0.06;
 
 /// A set of parts under construction.
 struct Node {
@@ -60,7 +61,8 @@ pub fn discover(
     let verdicts = vec![evidence.judge(&vec![Pose::IDENTITY; n_states])];
     let tree = KinematicTree { parts: vec!["base".to_string()], joints: Vec::new() };
     let open = open_samples(&verdicts);
-    let cost = PART_COST * verdicts[0].iter().map(|v| v.against.count_ones() as f64).sum::<f64>();
+    let share = PART_COST + PART_COST_CHANCE / n_states as f64;
+    let cost = share * verdicts[0].iter().map(|v| v.against.count_ones() as f64).sum::<f64>();
     let mut front = vec![Node { tree, verdicts, open, merit: 0.0 }];
     let mut best: Option<Node> = None;
     let width = if n_states < MANY_STATES { BEAM } else { 1 };
@@ -140,7 +142,7 @@ pub fn poses_of(tree: &KinematicTree, part: usize, n_states: usize) -> Vec<Pose>
 
 /// Samples that every part contradicts.
 fn open_samples(verdicts: &[Vec<Verdict>]) -> Vec<usize> {
-    (0..verdicts[0].len()).filter(|&i| verdicts.iter().all(|v| v[i].against != 0)).collect()
+    (0..verdicts[0].len()).filter(|&i| contradictions(verdicts, i) != 0).collect()
 }
 
 /// The best proposals that differ.

@@ -44,6 +44,14 @@ pub struct Verdict {
     pub fresh: u64,
 }
 
+/// Fewest contradictions of sample `i` under any of the parts in `verdicts`, of which the first is the base. Who moves a
+/// sample to where nobody looked explains nothing.
+pub fn contradictions(verdicts: &[Vec<Verdict>], i: usize) -> u32 {
+    let still = verdicts[0][i].against.count_ones();
+    let moved = verdicts[1..].iter().filter(|v| v[i].support != 0).map(|v| v[i].against.count_ones());
+    moved.fold(still, u32::min)
+}
+
 /// Most states that witness at once (bits of a [`Verdict`]).
 pub const MOST_STATES: usize = 64;
 /// Samples that labels are decided on: in all, and at most per state.

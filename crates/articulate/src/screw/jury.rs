@@ -1,6 +1,6 @@
 //! How much of what is unexplained would a new part explain?
 
-use super::evidence::{Evidence, Motion, Sample, Verdict};
+use super::evidence::{Evidence, Motion, Sample, Verdict, contradictions};
 use hingecast_geom::Pose;
 use rayon::prelude::*;
 
@@ -26,9 +26,8 @@ impl Jury {
         fastrand::Rng::with_seed(seed).shuffle(&mut chosen);
         chosen.truncate(SIZE);
         chosen.sort_unstable();
-        let fewest = |i: usize| verdicts.iter().map(|v| v[i].against.count_ones()).min().unwrap_or(0);
         let weight = open.len() as f64 / chosen.len().max(1) as f64;
-        Self { members: chosen.into_iter().map(|i| (evidence.samples[i], fewest(i))).collect(), weight }
+        Self { members: chosen.into_iter().map(|i| (evidence.samples[i], contradictions(verdicts, i))).collect(), weight }
     }
 
     /// Contradictions that a part with these poses (world from canonical) removes. With `tight`, surface only counts

@@ -4,7 +4,7 @@
 use super::adopt::asked_again;
 use super::discover::{Discovery, poses_of};
 use super::doubts::{REFUTED, rival};
-use super::evidence::{Evidence, Motion, Sample, Verdict};
+use super::evidence::{Evidence, Motion, Sample, Verdict, contradictions};
 use super::refine::{Report, Settings, refine};
 use crate::icp::{self, Surface};
 use glam::{DVec3, Vec3};
@@ -142,12 +142,10 @@ fn prune(evidence: &Evidence, tree: &mut KinematicTree, cost: f64) -> Vec<Vec<Ve
     let mut verdicts: Vec<Vec<Verdict>> =
         (0..tree.parts.len()).map(|p| evidence.judge(&poses_of(tree, p, n_states))).collect();
     loop {
-        let fewest = |i: usize, without: usize| {
-            let others = (0..verdicts.len()).filter(|p| *p != without);
-            others.map(|p| verdicts[p][i].against.count_ones()).min().unwrap_or(0)
-        };
         let gain = |p: usize| {
-            let each = |i: usize| (fewest(i, p) - fewest(i, usize::MAX)) as f64;
+            let mut without = verdicts.clone();
+            without.remove(p);
+            let each = |i: usize| (contradictions(&without, i) - contradictions(&verdicts, i)) as f64;
             (0..verdicts[0].len()).map(each).sum::<f64>()
         };
         let leaf = |p: &usize| !tree.joints.iter().any(|j| j.parent == *p);
