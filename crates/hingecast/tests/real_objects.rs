@@ -16,17 +16,17 @@ fn the_trash_can_has_its_hinge() {
     let dir = dir.path();
     hingecast(dir, "synth trashcan_102209 -o rec --states 13 --views 24 --test-views 2 --size 128 -q").done();
     for (method, axis_deg, pivot_share) in [("screw", 0.1, 0.003), ("track", 2.0, 0.02)] {
-    let settings = "--set fit.steps=500 --set fit.gaussians=5000 --set track.steps=240 --set twin.voxel=0.01";
-    let built = hingecast(dir, &format!("build rec -o {method} --method {method} {settings}")).done();
-    let answer = hingecast(dir, &format!("eval {method} --truth rec.truth --json")).done();
-    let figures = answer.json();
-    assert_finite(&figures, "eval");
-    assert_eq!(figures["found_parts"], figures["true_parts"], "{built}{answer}");
-    assert_eq!(figures["joint_type_accuracy"], 1.0, "{answer}");
-    let joint = &figures["joints"][0];
-    let pivot = joint["pivot"].as_f64().unwrap() / figures["diagonal"].as_f64().unwrap();
-    assert!(joint["axis_deg"].as_f64().unwrap() < axis_deg, "{answer}");
-    assert!(pivot < pivot_share, "pivot off by {pivot} of the diagonal\n{answer}");
+        let settings = "--set fit.steps=500 --set fit.gaussians=5000 --set track.steps=240 --set twin.voxel=0.01";
+        let built = hingecast(dir, &format!("build rec -o {method} --method {method} {settings}")).done();
+        let answer = hingecast(dir, &format!("eval {method} --truth rec.truth --json")).done();
+        let figures = answer.json();
+        assert_finite(&figures, "eval");
+        assert_eq!(figures["found_parts"], figures["true_parts"], "{built}{answer}");
+        assert_eq!(figures["joint_type_accuracy"], 1.0, "{answer}");
+        let joint = &figures["joints"][0];
+        let pivot = joint["pivot"].as_f64().unwrap() / figures["diagonal"].as_f64().unwrap();
+        assert!(joint["axis_deg"].as_f64().unwrap() < axis_deg, "{answer}");
+        assert!(pivot < pivot_share, "pivot off by {pivot} of the diagonal\n{answer}");
     }
 }
 

@@ -78,7 +78,7 @@ pub fn asked_again(evidence: &Evidence, joint: &Joint, members: &[Sample], place
             Sample { state: s.state, point: m.apply(s.point), normal: m.rot * s.normal }
         })
         .collect();
-        let range = whole_range(&joint.screw, evidence.extent());
+    let range = whole_range(&joint.screw, evidence.extent());
     let mut found = scan(evidence, &samples, place, &joint.screw, range, 1.0 * evidence.lattice.voxel);
     for (s, parent) in place.iter().enumerate() {
         let held = agreement(evidence, s, &samples, &Motion::from(*parent * joint.screw.motion(joint.values[s])));

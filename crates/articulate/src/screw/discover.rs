@@ -9,7 +9,7 @@ use super::adopt::adopt;
 use super::evidence::{Evidence, Motion, Sample, Verdict, contradictions};
 use super::jury::Jury;
 use super::plausible::plausibility;
-use super::propose::{Proposal, propose};
+use super::propose::{MANY_STATES, Proposal, propose};
 use hingecast_geom::{Cancelled, KinematicTree, Pose, Progress};
 use rayon::prelude::*;
 
@@ -24,17 +24,17 @@ pub struct Discovery {
     pub cost: f64,
 }
 
-/// Proposals that are refined before one is chosen.
-const FINALISTS: usize = 12;
+/// Proposals that are refined before one is chosen, and how many voxels apart they are. Few states leave a flat part free to
+/// slide in its own plane, where refining cannot pull it back: then neighbours are tried as well.
+const FINALISTS: (usize, f32) = (12, 8.0);
+const FINALISTS_OF_FEW: (usize, f32) = (24, 2.5);
 /// A part has at least this share of all samples, and this many.
 const LEAST_SHARE: f64 = 0.002;
 const LEAST: usize = 25;
 
 /// With few states a wrong motion can look best for the first part and leave the others in pieces, so this many
-/// alternatives are followed.
+/// alternatives are followed; from [`MANY_STATES`] on the first choice has always been right.
 const BEAM: usize = 4;
-/// States from which on the first choice has always been right.
-const MANY_STATES: usize = 4;
 
 /// What a part costs, share of all contradictions that a single rigid thing would have: its screw and its values have to be
 /// paid for by what they explain. With few states more is explained by chance.
@@ -78,7 +78,9 @@ pub fn discover(
             }
         }
         next.sort_by(|a, b| b.merit.total_cmp(&a.merit));
-        next.dedup_by(|b, a| (a.merit - b.merit).abs() < 0.005 * a.merit && a.open.len().abs_diff(b.open.len()) < LEAST);
+        next.dedup_by(|b, a| {
+            (a.merit - b.merit).abs() < 0.005 * a.merit && a.open.len().abs_diff(b.open.len()) < LEAST
+        });
         next.truncate(width);
         front = next;
         if front.is_empty() {
@@ -86,7 +88,9 @@ pub fn discover(
         }
     }
     let best = front.into_iter().chain(best).max_by(|a, b| a.merit.total_cmp(&b.merit)).expect("the first node");
-    let unexplained = best.open.len() as f64 / evidence.samples.len().max(1) as f64;
+    let contradicted = |i: &usize| best.verdicts.iter().all(|v| v[*i].against != 0);
+    let unexplained =
+        best.open.iter().filter(|i| contradicted(i)).count() as f64 / evidence.samples.len().max(1) as f64;
     Ok(Discovery { tree: best.tree, verdicts: best.verdicts, unexplained, cost })
 }
 
@@ -142,7 +146,7 @@ pub fn poses_of(tree: &KinematicTree, part: usize, n_states: usize) -> Vec<Pose>
 
 /// Samples that every part contradicts.
 fn open_samples(verdicts: &[Vec<Verdict>]) -> Vec<usize> {
-    (0..verdicts[0].len()).filter(|&i| contradictions(verdicts, i) != 0).collect()
+    (0..verdicts[0].len()).filter(|&i| contradictions(verdicts, i) > 0.0).collect()
 }
 
 /// The best proposals that differ.
@@ -156,6 +160,7 @@ fn finalists(evidence: &Evidence, mut all: Vec<Proposal>) -> Vec<Proposal> {
         let (v, first) = (&o.scan.values, p.scan.values[0]);
         Motion::from(o.screw.motion(v[s] - v[0]) * p.screw.motion(first))
     };
+    let (most, apart) = if evidence.n_states() < MANY_STATES { FINALISTS_OF_FEW } else { FINALISTS };
     let mut out: Vec<Proposal> = Vec::new();
     for p in all {
         let same = |o: &Proposal| {
@@ -163,13 +168,13 @@ fn finalists(evidence: &Evidence, mut all: Vec<Proposal>) -> Vec<Proposal> {
                 && o.parent == p.parent
                 && (0..p.scan.values.len()).all(|s| {
                     let (a, b) = (own(&p, s), other(o, &p, s));
-                    let apart = |x: &Sample| a.apply(x.point).distance(b.apply(x.point));
-                    p.crowd.iter().step_by(8).all(|x| apart(x) < 8.0 * evidence.lattice.voxel)
+                    let gap = |x: &Sample| a.apply(x.point).distance(b.apply(x.point));
+                    p.crowd.iter().step_by(8).all(|x| gap(x) < apart * evidence.lattice.voxel)
                 })
         };
         if !out.iter().any(same) {
             out.push(p);
-            if out.len() == FINALISTS {
+            if out.len() == most {
                 break;
             }
         }

@@ -44,12 +44,18 @@ pub struct Verdict {
     pub fresh: u64,
 }
 
-/// Fewest contradictions of sample `i` under any of the parts in `verdicts`, of which the first is the base. Who moves a
-/// sample to where nobody looked explains nothing.
-pub fn contradictions(verdicts: &[Vec<Verdict>], i: usize) -> u32 {
-    let still = verdicts[0][i].against.count_ones();
-    let moved = verdicts[1..].iter().filter(|v| v[i].support != 0).map(|v| v[i].against.count_ones());
-    moved.fold(still, u32::min)
+/// What is left of the base's contradictions when a part moves a sample to where nobody looked: that explains most of it,
+/// but another part that can show the sample explains it better.
+const UNSEEN_LEFT: f64 = 0.3;
+
+/// Fewest contradictions of sample `i` under any of the parts in `verdicts`, of which the first is the base.
+pub fn contradictions(verdicts: &[Vec<Verdict>], i: usize) -> f64 {
+    let still = verdicts[0][i].against.count_ones() as f64;
+    let moved = verdicts[1..].iter().map(|part| {
+        let (v, left) = (part[i], if part[i].support == 0 { UNSEEN_LEFT * still } else { 0.0 });
+        left.max(v.against.count_ones() as f64)
+    });
+    moved.fold(still, f64::min)
 }
 
 /// Most states that witness at once (bits of a [`Verdict`]).
@@ -100,9 +106,7 @@ impl Evidence {
                 let near = tree.k_nearest(*x, NEIGHBOURS + 1);
                 near.into_iter().skip(1).map(|j| first + j).collect::<Vec<u32>>()
             }));
-            samples.extend(
-                order.iter().map(|&i| Sample { state, point: cloud.points[i], normal: cloud.normals[i] }),
-            );
+            samples.extend(order.iter().map(|&i| Sample { state, point: cloud.points[i], normal: cloud.normals[i] }));
             clouds.push(Surface::new(cloud.points, cloud.normals));
         }
         let mut evidence = Self { lattice, clouds, spaces, samples, neighbours, tolerance: 0.2 * lattice.voxel };

@@ -267,16 +267,20 @@ mod tests {
 
     #[test]
     fn one_correspondence_gives_the_hinge() {
-        let truth = Screw { kind: JointKind::Revolute, axis: DVec3::new(0.1, 0.2, 1.0).normalize(), pivot: DVec3::new(0.3, -0.2, 0.1) };
+        let truth = Screw {
+            kind: JointKind::Revolute,
+            axis: DVec3::new(0.1, 0.2, 1.0).normalize(),
+            pivot: DVec3::new(0.3, -0.2, 0.1),
+        };
         let pose = truth.motion(0.9);
         let (x, n) = (DVec3::new(1.0, 0.4, 0.3), DVec3::new(0.3, 0.9, 0.2).normalize());
         let mut best = f64::INFINITY;
         let (y, m) = (pose.apply(x), pose.rotate(n));
         candidates(x.as_vec3(), n.as_vec3(), y.as_vec3(), m.as_vec3(), 0.01, &mut |s, q| {
-            let off = s.axis.cross(truth.axis).length() + truth.distance(s.pivot) + (s.motion(q).inverse() * pose).angle();
+            let off =
+                s.axis.cross(truth.axis).length() + truth.distance(s.pivot) + (s.motion(q).inverse() * pose).angle();
             best = best.min(off);
         });
         assert!(best < 1e-4, "{best}");
     }
 }
-

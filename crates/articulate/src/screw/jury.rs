@@ -7,7 +7,7 @@ use rayon::prelude::*;
 /// Open samples that judge proposals.
 pub struct Jury {
     /// Sample, and the fewest contradictions under a known part.
-    members: Vec<(Sample, u32)>,
+    members: Vec<(Sample, f64)>,
     /// Open samples per member.
     weight: f64,
 }
@@ -27,16 +27,19 @@ impl Jury {
         chosen.truncate(SIZE);
         chosen.sort_unstable();
         let weight = open.len() as f64 / chosen.len().max(1) as f64;
-        Self { members: chosen.into_iter().map(|i| (evidence.samples[i], contradictions(verdicts, i))).collect(), weight }
+        Self {
+            members: chosen.into_iter().map(|i| (evidence.samples[i], contradictions(verdicts, i))).collect(),
+            weight,
+        }
     }
 
     /// Contradictions that a part with these poses (world from canonical) removes. With `tight`, surface only counts
     /// whole where it is met within the noise, and is not explained already.
     pub fn gain(&self, evidence: &Evidence, poses: &[Pose], tight: bool) -> f64 {
         let between = evidence.between(poses);
-        let each = |(s, fewest): &(Sample, u32)| {
+        let each = |(s, fewest): &(Sample, f64)| {
             let v = evidence.ask_all(s, &between[s.state]);
-            let removed = fewest.saturating_sub(v.against.count_ones()) as f64;
+            let removed = (fewest - v.against.count_ones() as f64).max(0.0);
             if removed == 0.0 || v.fresh == 0 {
                 return removed * UNSEEN;
             }

@@ -22,6 +22,8 @@ const ASKED: usize = 36;
 pub const CROWD: usize = 200;
 /// Fewer samples do not make a pair worth looking at, or a pose worth asking.
 const FEW: usize = 12;
+/// With fewer states a flat part is free to slide in its own plane: neighbours are kept as well.
+pub const MANY_STATES: usize = 4;
 
 /// A screw on a parent, ready to become a part.
 pub struct Proposal {
@@ -89,7 +91,7 @@ pub fn propose(
                 let mut crowd = crowd;
                 rng.shuffle(&mut crowd);
                 crowd.truncate(CROWD);
-                                let range = whole_range(&h.screw, evidence.extent());
+                let range = whole_range(&h.screw, evidence.extent());
                 let found = scan(evidence, &crowd, place, &h.screw, range, 1.5 * evidence.lattice.voxel);
                 let own: Vec<Pose> = (0..n).map(|s| place[s] * h.screw.motion(found.values[s])).collect();
                 let gain = jury.gain(evidence, &own, false);
@@ -182,11 +184,12 @@ fn align(
     }
     screws.sort_by(|a, b| b.0.total_cmp(&a.0));
     let extent = points(&jury);
+    let (keep, apart) = if evidence.n_states() < MANY_STATES { (2 * keep, 2.0) } else { (keep, 4.0) };
     let mut kept: Vec<Hypothesis> = Vec::new();
     let mut out = Vec::new();
     for (_, h, crowd) in screws {
         let with: Vec<Hypothesis> = kept.iter().copied().chain([h]).collect();
-        if distinct(with, &extent, 4.0 * voxel as f32, usize::MAX).len() > kept.len() {
+        if distinct(with, &extent, apart * voxel as f32, usize::MAX).len() > kept.len() {
             kept.push(h);
             out.push((h, crowd));
             if out.len() >= keep {
@@ -200,4 +203,3 @@ fn align(
 fn normals(samples: &[Sample]) -> Vec<glam::Vec3> {
     samples.iter().map(|s| s.normal).collect()
 }
-

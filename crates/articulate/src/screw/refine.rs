@@ -282,7 +282,8 @@ fn chain(tree: &KinematicTree, part: usize) -> Vec<usize> {
 
 /// Pivots slide along their axes to beside their part: far from it, tilt and shift would be hard to tell apart.
 fn centre_pivots(tree: &mut KinematicTree, members: &[(Sample, usize)]) {
-    let poses: Vec<Vec<Pose>> = (0..tree.joints.first().map_or(0, |j| j.values.len())).map(|s| tree.poses_at(s)).collect();
+    let poses: Vec<Vec<Pose>> =
+        (0..tree.joints.first().map_or(0, |j| j.values.len())).map(|s| tree.poses_at(s)).collect();
     for j in 0..tree.joints.len() {
         let (child, parent) = (tree.joints[j].child, tree.joints[j].parent);
         let own = members.iter().filter(|m| m.1 == child);

@@ -87,9 +87,8 @@ pub fn label(evidence: &Evidence, verdicts: &[Vec<Verdict>]) -> Vec<u8> {
             .collect();
     }
     // Ties go to the base.
-    let best = |i: usize| {
-        (0..costs.len()).fold(0, |best, p| if costs[p][i] < costs[best][i] - 1e-3 { p } else { best }) as u8
-    };
+    let best =
+        |i: usize| (0..costs.len()).fold(0, |best, p| if costs[p][i] < costs[best][i] - 1e-3 { p } else { best }) as u8;
     (0..n).map(best).collect()
 }
 
@@ -145,7 +144,7 @@ fn prune(evidence: &Evidence, tree: &mut KinematicTree, cost: f64) -> Vec<Vec<Ve
         let gain = |p: usize| {
             let mut without = verdicts.clone();
             without.remove(p);
-            let each = |i: usize| (contradictions(&without, i) - contradictions(&verdicts, i)) as f64;
+            let each = |i: usize| contradictions(&without, i) - contradictions(&verdicts, i);
             (0..verdicts[0].len()).map(each).sum::<f64>()
         };
         let leaf = |p: &usize| !tree.joints.iter().any(|j| j.parent == *p);

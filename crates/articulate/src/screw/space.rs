@@ -189,7 +189,11 @@ impl Carver {
             _ => 0.0,
         };
         let rows: Vec<f32> = (0..w * h)
-            .map(|i| (i.saturating_sub(usize::from(i % w > 0))..=i + usize::from(i % w + 1 < w)).map(own).fold(f32::INFINITY, f32::min))
+            .map(|i| {
+                (i.saturating_sub(usize::from(i % w > 0))..=i + usize::from(i % w + 1 < w))
+                    .map(own)
+                    .fold(f32::INFINITY, f32::min)
+            })
             .collect();
         let at = |i: usize, y: usize| rows[y * w + i % w];
         let empty_to = (0..w * h)

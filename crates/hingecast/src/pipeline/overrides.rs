@@ -49,12 +49,13 @@ fn one(file: &mut JointsFile, entry: &JointOverride) -> std::result::Result<(), 
     let Some(j) = names.iter().position(|n| *n == entry.joint) else {
         return Err((format!("no joint '{}'", entry.joint), there));
     };
-    let parent = match &entry.parent {
-        None => file.tree.joints[j].parent,
-        Some(name) => file.tree.parts.iter().position(|p| p == name).ok_or_else(|| {
-            (format!("no part '{name}'"), format!("parent = one of: {}", file.tree.parts.join(", ")))
-        })?,
-    };
+    let parent =
+        match &entry.parent {
+            None => file.tree.joints[j].parent,
+            Some(name) => file.tree.parts.iter().position(|p| p == name).ok_or_else(|| {
+                (format!("no part '{name}'"), format!("parent = one of: {}", file.tree.parts.join(", ")))
+            })?,
+        };
     let joint = &mut file.tree.joints[j];
     // What was in doubt about it a person has now decided.
     let mark = format!("'{}'", joint.name);

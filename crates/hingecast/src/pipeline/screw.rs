@@ -56,8 +56,7 @@ fn load_samples(run: &Path) -> Result<Vec<Labelled>> {
 pub fn canonical_points(run: &Path, tree: &KinematicTree, most: usize) -> Result<Vec<Vec<Vec3>>> {
     let mut out = vec![Vec::new(); tree.parts.len()];
     let n_states = tree.joints.first().map_or(1, |j| j.values.len());
-    let back: Vec<Vec<Pose>> =
-        (0..n_states).map(|s| tree.poses_at(s).iter().map(Pose::inverse).collect()).collect();
+    let back: Vec<Vec<Pose>> = (0..n_states).map(|s| tree.poses_at(s).iter().map(Pose::inverse).collect()).collect();
     for s in load_samples(run)? {
         let pose = &back[s.state.min(n_states - 1)][s.part as usize];
         out[s.part as usize].push(pose.apply(s.point.as_dvec3()).as_vec3());
@@ -175,7 +174,9 @@ fn spread(context: &Context) -> Vec<usize> {
         let stride = frames.len() as f64 / most.min(frames.len()) as f64;
         // Each state begins elsewhere, so that all cameras of a fixed rig get their turn.
         let first = (s as f64 * 0.618).fract() * stride;
-        out.extend((0..most.min(frames.len())).map(|k| frames[((first + k as f64 * stride) as usize).min(frames.len() - 1)]));
+        out.extend(
+            (0..most.min(frames.len())).map(|k| frames[((first + k as f64 * stride) as usize).min(frames.len() - 1)]),
+        );
     }
     out
 }
@@ -228,7 +229,9 @@ pub fn pixel_labels(context: &Context, run: &Path, frames: &[usize]) -> Result<V
     let of_frame = |&f: &usize| -> Result<Vec<u8>> {
         let view = context.view(f)?;
         let (tree, parts) = &by_state[context.recording.frames[f].state];
-        let silent = |i: usize| if view.usable[i] == 1 && view.mask[i] == 0 && !(view.depth[i] > 0.0) { BACKGROUND } else { UNKNOWN };
+        let silent = |i: usize| {
+            if view.usable[i] == 1 && view.mask[i] == 0 && !(view.depth[i] > 0.0) { BACKGROUND } else { UNKNOWN }
+        };
         let mut out: Vec<u8> = (0..view.mask.len()).map(silent).collect();
         super::surface::unproject(&view, 1, &mut |x, i| {
             if let Some((k, _)) = tree.nearest(x.as_vec3()).filter(|n| n.1 < reach) {
@@ -247,4 +250,3 @@ pub fn run_joints(context: &Context, run: &Path, at: &Path) -> Result<()> {
     overrides::apply(&mut file, &context.config.joint)?;
     write_json(&at.join("joints.json"), &file)
 }
-

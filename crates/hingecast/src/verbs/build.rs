@@ -3,8 +3,8 @@
 use super::{Outcome, Session};
 use crate::cli::{Build, BuildSettings};
 use hingecast::config::Config;
-use hingecast::failure::{Failure, Result};
 use hingecast::config::Method;
+use hingecast::failure::{Failure, Result};
 use hingecast::pipeline::{self, Span, stages};
 use hingecast::report;
 use hingecast::stage::RunFolder;

@@ -32,10 +32,15 @@ struct Row {
 }
 
 pub fn run(session: &Session, args: &Bench, names: &[String]) -> Result<Outcome> {
-    let wanted: Vec<_> = PROTOCOLS.iter().filter(|p| args.protocols.is_empty() || args.protocols.iter().any(|n| n == p.0)).collect();
+    let wanted: Vec<_> =
+        PROTOCOLS.iter().filter(|p| args.protocols.is_empty() || args.protocols.iter().any(|n| n == p.0)).collect();
     if wanted.is_empty() {
         let all: Vec<&str> = PROTOCOLS.iter().map(|p| p.0).collect();
-        return Err(Failure::new("no such protocol", format!("--protocol {:?}", args.protocols), format!("one of {}", all.join(", "))));
+        return Err(Failure::new(
+            "no such protocol",
+            format!("--protocol {:?}", args.protocols),
+            format!("one of {}", all.join(", ")),
+        ));
     }
     let build_config = build::config(&args.build)?;
     let mut rows: Vec<Row> = Vec::new();
@@ -61,7 +66,8 @@ pub fn run(session: &Session, args: &Bench, names: &[String]) -> Result<Outcome>
                 }
             }
         }
-        let own: Vec<&PartsEvaluation> = rows.iter().filter(|r| r.protocol == *protocol).map(|r| &r.evaluation).collect();
+        let own: Vec<&PartsEvaluation> =
+            rows.iter().filter(|r| r.protocol == *protocol).map(|r| &r.evaluation).collect();
         let _ = writeln!(text, "{}", summary(protocol, &own));
     }
     session.ui.say(&format!("\n{text}"));
@@ -100,7 +106,14 @@ fn line(protocol: &str, e: &PartsEvaluation) -> String {
             format!("{found} {:.3} deg, motion {:.4}", j.axis_deg, j.motion_mean)
         })
         .collect();
-    format!("{protocol} {}: {} of {} parts; {}; {:.0} s", e.object, e.found_parts, e.true_parts, joints.join("; "), e.secs)
+    format!(
+        "{protocol} {}: {} of {} parts; {}; {:.0} s",
+        e.object,
+        e.found_parts,
+        e.true_parts,
+        joints.join("; "),
+        e.secs
+    )
 }
 
 /// One line of the table: means over joints of means over objects and seeds.
