@@ -86,6 +86,7 @@ impl Config {
                 // Fewer steps must be longer ones, or wide moves between states are lost.
                 c.track.steps = 240;
                 c.track.rate[0] = 1.6e-3;
+                c.screw.cells = 72;
                 c.twin.voxel = 1.0 / 160.0;
             }
             Preset::Default => {}

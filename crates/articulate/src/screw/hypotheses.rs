@@ -118,7 +118,7 @@ impl Duel<'_> {
             })
             .collect::<Vec<_>>()
             .concat();
-        found.sort_by(|a, b| b.score.cmp(&a.score));
+        found.sort_by_key(|h| std::cmp::Reverse(h.score));
         distinct(found, &marks, 3.0 * voxel, keep)
     }
 }
@@ -220,7 +220,7 @@ impl<'a> Distinct<'a> {
     }
 
     fn sorted(mut self) -> Vec<Hypothesis> {
-        self.held.sort_by(|a, b| b.0.score.cmp(&a.0.score));
+        self.held.sort_by_key(|h| std::cmp::Reverse(h.0.score));
         self.held.into_iter().map(|h| h.0).collect()
     }
 }

@@ -27,7 +27,7 @@ pub mod settle;
 pub mod space;
 
 use cloud::DepthView;
-use evidence::{Evidence, MOST_STATES};
+use evidence::Evidence;
 use glam::Vec3;
 use hingecast_geom::{Cancelled, KinematicTree, Pose, Progress};
 use serde::{Deserialize, Serialize};
@@ -74,6 +74,8 @@ pub struct Found {
 
 /// Finds parts and joints. `extent`: box of the object over all states; `states(s)`: the views of state s.
 ///
+/// At most [`evidence::MOST_STATES`] states.
+///
 /// # Errors
 /// What `states` fails with, or the wish to stop.
 pub fn run<E: From<Cancelled>>(
@@ -87,7 +89,7 @@ pub fn run<E: From<Cancelled>>(
     let lattice = space::Lattice::new(extent.0, extent.1, config.cells);
     let mut cameras: Vec<Vec<Pose>> = Vec::new();
     let mut evidence = Evidence::gather::<E>(
-        n_states.min(MOST_STATES),
+        n_states,
         lattice,
         &mut |state| {
             progress.report(state, n_states, "surface and space")?;

@@ -163,7 +163,7 @@ fn align(
             Some((Hypothesis { score, ..*h }, back[a] * pose))
         })
         .collect();
-    all.sort_by(|x, y| y.0.score.cmp(&x.0.score));
+    all.sort_by_key(|h| std::cmp::Reverse(h.0.score));
     // Each pose as a hinge and as a slide, where that is what it is.
     let mut screws: Vec<(f64, Hypothesis, Vec<Sample>)> = Vec::new();
     for (h, pose) in all {

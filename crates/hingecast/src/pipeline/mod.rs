@@ -13,6 +13,7 @@ use crate::config::{Config, Method};
 use crate::failure::{Failure, Result};
 use crate::stage::{RunFolder, erased, stamp};
 use crate::ui::Ui;
+use hingecast_articulate::screw::evidence::MOST_STATES;
 use hingecast_capture::{Recording, Split, View, ViewCache};
 use hingecast_geom::Pose;
 use std::collections::BTreeMap;
@@ -67,6 +68,16 @@ pub struct Span {
 pub fn build(recording: &Path, run: &Path, config: &Config, threads: usize, span: &Span, ui: &Ui) -> Result<RunFolder> {
     let recording = Recording::open(recording)?;
     refuse_hopeless(&recording)?;
+    if config.method == Method::Screw && recording.n_states > MOST_STATES {
+        return Err(Failure::new(
+            format!(
+                "the recording has {} states, and the method screw takes at most {MOST_STATES}",
+                recording.n_states
+            ),
+            recording.root.join("transforms.json").display().to_string(),
+            "leave out states between the others, or build with --method track",
+        ));
+    }
     if span.fresh && run.exists() {
         std::fs::remove_dir_all(run).map_err(Failure::io(run))?;
     }
