@@ -140,7 +140,7 @@ pub struct Build {
     pub out: Option<PathBuf>,
     #[command(flatten)]
     pub settings: BuildSettings,
-    /// First stage to redo even if it is done: parts, splat, joints or twin (with --method track: splat, motion, parts,
+    /// First stage to redo even if it is done: parts, splat, joints or twin (method track: splat, motion, parts,
     /// joints, twin) [default: the first that is missing].
     #[arg(long, value_name = "STAGE")]
     pub from: Option<String>,
@@ -212,15 +212,15 @@ pub struct Bench {
     /// Seed of cameras, play and noise of the recordings.
     #[arg(long, default_value_t = 0, value_name = "N")]
     pub recording_seed: u64,
-    /// Only parts and joints, under protocols of 25, 5 and 2 states with and without noise (see --protocol); the
-    /// method is screw. --size makes it quicker.
+    /// Only parts and joints, under protocols of 25, 5 and 2 states with and without noise; the
+    /// method is screw. Smaller pictures make it quicker.
     #[arg(long)]
     pub joints: bool,
-    /// With --joints: 25x60, 25x60-d435, 5x48, 5x48-d435, 2x100 or 2x100-d435 (states x views); may be repeated
+    /// For the bench of joints: 25x60, 25x60-d435, 5x48, 5x48-d435, 2x100 or 2x100-d435 (states x views); may be repeated
     /// [default: all].
     #[arg(long = "protocol", value_name = "NAME")]
     pub protocols: Vec<String>,
-    /// With --joints: recordings of each object, with seeds from --recording-seed on.
+    /// For the bench of joints: recordings of each object, with seeds from --recording-seed on.
     #[arg(long, default_value_t = 1, value_name = "N")]
     pub seeds: u64,
     /// Delete each recording once it is evaluated (56 MB per object at the defaults).

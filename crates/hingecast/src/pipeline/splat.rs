@@ -75,7 +75,7 @@ pub fn extent(context: &Context, states: &[usize]) -> Result<(glam::DVec3, glam:
     let mut axes: [Vec<f64>; 3] = std::array::from_fn(|a| points.iter().flatten().map(|x| x[a]).collect());
     if axes[0].len() < 100 {
         return Err(Failure::new(
-            "there is no object: fewer than 100 pixels have mask and depth",
+            "the recording shows no object: fewer than 100 pixels have mask and depth",
             context.recording.root.display().to_string(),
             "hingecast check RECORDING; are the masks inverted, or the depth unit wrong?",
         ));
