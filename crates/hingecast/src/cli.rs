@@ -220,7 +220,7 @@ pub struct Bench {
     /// [default: all].
     #[arg(long = "protocol", value_name = "NAME")]
     pub protocols: Vec<String>,
-    /// For the bench of joints: recordings of each object, with seeds from --recording-seed on.
+    /// For the bench of joints: recordings of each object, with consecutive seeds.
     #[arg(long, default_value_t = 1, value_name = "N")]
     pub seeds: u64,
     /// Delete each recording once it is evaluated (56 MB per object at the defaults).
