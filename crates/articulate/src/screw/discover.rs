@@ -27,7 +27,7 @@ pub struct Discovery {
 /// Proposals that are refined before one is chosen, and how many voxels apart they are. Few states leave a flat part free to
 /// slide in its own plane, where refining cannot pull it back: then neighbours are tried as well.
 const FINALISTS: (usize, f32) = (12, 8.0);
-const FINALISTS_OF_FEW: (usize, f32) = (24, 2.5);
+const NEIGHBOURS: (usize, f32) = (24, 2.5);
 /// A part has at least this share of all samples, and this many.
 const LEAST_SHARE: f64 = 0.002;
 const LEAST: usize = 25;
@@ -160,24 +160,28 @@ fn finalists(evidence: &Evidence, mut all: Vec<Proposal>) -> Vec<Proposal> {
         let (v, first) = (&o.scan.values, p.scan.values[0]);
         Motion::from(o.screw.motion(v[s] - v[0]) * p.screw.motion(first))
     };
-    let (most, apart) = if evidence.n_states() < MANY_STATES { FINALISTS_OF_FEW } else { FINALISTS };
     let mut out: Vec<Proposal> = Vec::new();
-    for p in all {
-        let same = |o: &Proposal| {
-            o.screw.kind == p.screw.kind
-                && o.parent == p.parent
-                && (0..p.scan.values.len()).all(|s| {
-                    let (a, b) = (own(&p, s), other(o, &p, s));
-                    let gap = |x: &Sample| a.apply(x.point).distance(b.apply(x.point));
-                    p.crowd.iter().step_by(8).all(|x| gap(x) < apart * evidence.lattice.voxel)
-                })
-        };
-        if !out.iter().any(same) {
-            out.push(p);
-            if out.len() == most {
-                break;
+    // First what differs much, then, with few states, what differs little.
+    let tiers = if evidence.n_states() < MANY_STATES { &[FINALISTS, NEIGHBOURS][..] } else { &[FINALISTS][..] };
+    for (most, apart) in tiers {
+        let mut rest = Vec::new();
+        for p in all {
+            let same = |o: &Proposal| {
+                o.screw.kind == p.screw.kind
+                    && o.parent == p.parent
+                    && (0..p.scan.values.len()).all(|s| {
+                        let (a, b) = (own(&p, s), other(o, &p, s));
+                        let gap = |x: &Sample| a.apply(x.point).distance(b.apply(x.point));
+                        p.crowd.iter().step_by(8).all(|x| gap(x) < apart * evidence.lattice.voxel)
+                    })
+            };
+            if out.len() < *most && !out.iter().any(same) {
+                out.push(p);
+            } else {
+                rest.push(p);
             }
         }
+        all = rest;
     }
     out
 }

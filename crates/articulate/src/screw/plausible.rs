@@ -17,7 +17,7 @@ const FACES: f64 = 0.08;
 /// Angle between an axis and a face that counts as along it, radians.
 const ALONG: f64 = 0.03;
 /// A hinge that its part reaches.
-const REACHED: f64 = 0.12;
+const REACHED: f64 = 0.25;
 /// Distance that counts as reaching, share of the object's extent.
 const NEAR: f64 = 0.04;
 

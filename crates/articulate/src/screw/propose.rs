@@ -184,18 +184,23 @@ fn align(
     }
     screws.sort_by(|a, b| b.0.total_cmp(&a.0));
     let extent = points(&jury);
-    let (keep, apart) = if evidence.n_states() < MANY_STATES { (2 * keep, 2.0) } else { (keep, 4.0) };
     let mut kept: Vec<Hypothesis> = Vec::new();
     let mut out = Vec::new();
-    for (_, h, crowd) in screws {
-        let with: Vec<Hypothesis> = kept.iter().copied().chain([h]).collect();
-        if distinct(with, &extent, apart * voxel as f32, usize::MAX).len() > kept.len() {
-            kept.push(h);
-            out.push((h, crowd));
-            if out.len() >= keep {
-                break;
+    // First what differs much, then, with few states, what differs little.
+    let tiers = if evidence.n_states() < MANY_STATES { &[(1, 4.0), (2, 2.0)][..] } else { &[(1, 4.0)][..] };
+    for (share, apart) in tiers {
+        let mut rest = Vec::new();
+        for screw in screws {
+            let with: Vec<Hypothesis> = kept.iter().copied().chain([screw.1]).collect();
+            let new = distinct(with, &extent, apart * voxel as f32, usize::MAX).len() > kept.len();
+            if new && out.len() < share * keep {
+                kept.push(screw.1);
+                out.push((screw.1, screw.2));
+            } else {
+                rest.push(screw);
             }
         }
+        screws = rest;
     }
     out
 }
