@@ -1,6 +1,7 @@
 //! A proposal becomes a part.
 
-use super::evidence::{Evidence, Motion, Sample};
+use super::discover::poses_of;
+use super::evidence::{Evidence, Motion, Sample, Verdict};
 use super::propose::{CROWD, Proposal};
 use super::refine::{self, refine};
 use super::scan::{agreement, scan, whole_range};
@@ -8,10 +9,11 @@ use hingecast_geom::{Joint, KinematicTree, Pose};
 
 /// Adds the proposal to the tree as a part; its screw and values are refined and asked again in turns, first with the
 /// source samples, then with everything that moves with it.
-pub fn adopt(evidence: &Evidence, tree: &mut KinematicTree, p: &Proposal, seed: u64) {
+/// `still`: the verdicts on all samples if they moved with the parent.
+pub fn adopt(evidence: &Evidence, tree: &mut KinematicTree, p: &Proposal, still: &[Verdict], seed: u64) {
     let n_states = evidence.n_states();
     let child = tree.parts.len();
-    let place: Vec<Pose> = (0..n_states).map(|s| tree.poses_at(s)[p.parent]).collect();
+    let place = poses_of(tree, p.parent, n_states);
     tree.parts.push(format!("part_{child}"));
     // Values count from state 0; the crowd stands where state `source` has it.
     let zero = p.scan.values[0];
@@ -28,10 +30,9 @@ pub fn adopt(evidence: &Evidence, tree: &mut KinematicTree, p: &Proposal, seed: 
         rescan(evidence, tree, &crowd, &place);
     }
     for gate in [1.5, 1.0, 0.7] {
-        let own: Vec<Pose> = (0..n_states).map(|s| tree.poses_at(s)[child]).collect();
-        let (mine, parents) = (evidence.judge(&own), evidence.judge(&place));
+        let mine = evidence.judge(&poses_of(tree, child, n_states));
         let mut members: Vec<Sample> = (0..evidence.samples.len())
-            .filter(|&i| mine[i].against == 0 && mine[i].support != 0 && parents[i].against != 0)
+            .filter(|&i| mine[i].against == 0 && mine[i].support != 0 && still[i].against != 0)
             .map(|i| evidence.samples[i])
             .collect();
         if members.len() < 20 {
@@ -45,8 +46,6 @@ pub fn adopt(evidence: &Evidence, tree: &mut KinematicTree, p: &Proposal, seed: 
         // Asking answers in steps of the grid.
         polish(evidence, tree, &all, gate * voxel, 4, seed);
     }
-    let joint = tree.joints.last_mut().expect("just pushed");
-    joint.limits = joint.values.iter().fold([0.0f64; 2], |l, v| [l[0].min(*v), l[1].max(*v)]);
 }
 
 /// Gauss-Newton on the last joint alone.

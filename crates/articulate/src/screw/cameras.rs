@@ -23,9 +23,8 @@ const TETHER: f64 = 0.01;
 /// Below this share of a voxel the views agree already.
 const SHARP: f32 = 0.04;
 
-/// Corrects the cameras of one state's views in place. Answers the root mean square distance between the views' planes
-/// before and after, scene units.
-pub fn align(views: &mut [DepthView], voxel: f32) -> [f32; 2] {
+/// Corrects the cameras of one state's views in place; leaves them alone where they agree already.
+pub fn align(views: &mut [DepthView], voxel: f32) {
     let planes: Vec<Vec<(Vec3, Vec3)>> = views
         .par_iter()
         .map(|view| {
@@ -36,10 +35,9 @@ pub fn align(views: &mut [DepthView], voxel: f32) -> [f32; 2] {
             out
         })
         .collect();
-    let centre = mean_point(&planes);
+    let centre = mean_point(planes.iter().flatten().map(|(x, _)| *x));
     // World as corrected from world as recorded.
     let mut corrections = vec![Pose::IDENTITY; views.len()];
-    let mut spread = [0.0f32; 2];
     for round in 0..ROUNDS {
         let cloud = merge(
             planes.iter().zip(&corrections).flat_map(|(p, c)| {
@@ -50,40 +48,34 @@ pub fn align(views: &mut [DepthView], voxel: f32) -> [f32; 2] {
             2,
         );
         let surface = Surface::new(cloud.points, cloud.normals);
+        if round == 0 && residual(&planes, &surface) < SHARP * voxel {
+            return;
+        }
         let wide = if round < 2 { 3.0 } else { 1.5 };
         let gates = [wide, wide, 0.7 * wide].map(|g| g * voxel as f64);
-        let stepped: Vec<(Pose, f64)> = planes
+        let stepped: Vec<Pose> = planes
             .par_iter()
             .zip(&corrections)
             .map(|(p, c)| {
                 if p.len() < FEW {
-                    return (*c, 0.0);
+                    return *c;
                 }
                 let (points, normals): (Vec<Vec3>, Vec<Vec3>) = p.iter().copied().unzip();
                 let (pose, report) = icp::align_tethered(&points, &normals, &surface, *c, &gates, TETHER);
-                if report.inliers < 0.3 { (*c, 0.0) } else { (pose, report.rms) }
+                if report.inliers < 0.3 { *c } else { pose }
             })
             .collect();
-        let rms = (stepped.iter().map(|s| s.1 * s.1).sum::<f64>() / stepped.len().max(1) as f64).sqrt() as f32;
-        if round == 0 {
-            let off = residual(&planes, &surface);
-            spread = [off, off];
-            if off < SHARP * voxel {
-                return spread;
-            }
-        }
-        spread[1] = rms;
-        corrections = without_mean(stepped.into_iter().map(|s| s.0).collect(), centre);
+        corrections = without_mean(&stepped, centre);
     }
     for (view, c) in views.iter_mut().zip(&corrections) {
         view.camera.camera_from_world = view.camera.camera_from_world * c.inverse();
     }
-    spread
 }
 
-fn mean_point(planes: &[Vec<(Vec3, Vec3)>]) -> DVec3 {
-    let all = planes.iter().flatten().fold((DVec3::ZERO, 0.0), |(sum, n), (x, _)| (sum + x.as_dvec3(), n + 1.0));
-    all.0 / f64::max(all.1, 1.0)
+/// Mean position; the origin for no points.
+pub fn mean_point(points: impl Iterator<Item = Vec3>) -> DVec3 {
+    let (sum, n) = points.fold((DVec3::ZERO, 0.0), |(sum, n), x| (sum + x.as_dvec3(), n + 1.0));
+    sum / f64::max(n, 1.0)
 }
 
 /// Median distance of the planes' points from the surface, as recorded.
@@ -104,12 +96,11 @@ fn residual(planes: &[Vec<(Vec3, Vec3)>], surface: &Surface) -> f32 {
 }
 
 /// Takes the mean rotation, and the mean shift of the object's centre, out of the corrections.
-fn without_mean(corrections: Vec<Pose>, centre: DVec3) -> Vec<Pose> {
+pub fn without_mean(corrections: &[Pose], centre: DVec3) -> Vec<Pose> {
     let n = corrections.len() as f64;
     let turn = corrections.iter().map(|c| rotation_vector(c.rot)).sum::<DVec3>() / n;
     let shift = corrections.iter().map(|c| c.apply(centre) - centre).sum::<DVec3>() / n;
     let rot = quat_from_rotation_vector(turn);
-    let mean = Pose::new(rot, centre + shift - rot * centre);
-    let back = mean.inverse();
-    corrections.into_iter().map(|c| back * c).collect()
+    let back = Pose::new(rot, centre + shift - rot * centre).inverse();
+    corrections.iter().map(|c| back * *c).collect()
 }

@@ -54,9 +54,9 @@ impl DepthView {
         *second.select_nth_unstable_by(half, f32::total_cmp).1 / 0.6745 / 1.5f32.sqrt()
     }
 
-    /// Half the window that makes normals good enough, pixels.
-    fn window(&self) -> usize {
-        let noise = self.noise() * self.camera.fx as f32;
+    /// Half the window that makes normals good enough at this noise, pixels.
+    fn window(&self, noise: f32) -> usize {
+        let noise = noise * self.camera.fx as f32;
         // Sum of dx^2 over the window.
         [(1, 6.0f32), (2, 50.0), (3, 196.0)]
             .into_iter()
@@ -69,7 +69,8 @@ impl DepthView {
         let (w, h, c) = (self.camera.width, self.camera.height, &self.camera);
         let world_from_camera = c.camera_from_world.inverse();
         let (rot, trans) = (world_from_camera.mat3().as_mat3(), world_from_camera.trans);
-        let (r, noise) = (self.window() as isize, self.noise());
+        let noise = self.noise();
+        let r = self.window(noise) as isize;
         let slope = |x: f64, centre: f64, f: f64| ((x + 0.5 - centre) / f) as f32;
         // Beyond this share of z a neighbour lies on another surface.
         let jump = (2.5 / c.fx as f32) * r as f32 + 4.0 * noise;

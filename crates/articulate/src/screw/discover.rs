@@ -112,7 +112,7 @@ fn grow(evidence: &mut Evidence, node: &Node, width: usize, cost: f64, seed: u64
         .par_iter()
         .map(|p| {
             let mut tree = node.tree.clone();
-            adopt(evidence, &mut tree, p, seed);
+            adopt(evidence, &mut tree, p, &node.verdicts[p.parent], seed);
             let own = poses_of(&tree, tree.parts.len() - 1, n_states);
             let joint = tree.joints.last().expect("a part was added");
             let weight = plausibility(&joint.screw, &joint.values, joint.parent, &p.crowd, evidence.extent());

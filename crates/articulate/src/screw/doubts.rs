@@ -1,11 +1,12 @@
 //! What a person should know before believing the joints: rivals that explain the recording nearly as well, what the depth
 //! hardly determines, pieces that always moved together.
 
+use super::discover::poses_of;
 use super::evidence::{Evidence, Sample};
 use super::refine::{Settings, refine};
-use super::settle::Settled;
+use super::settle::{Settled, members};
 use glam::{DVec3, IVec3, Vec3};
-use hingecast_geom::{Joint, JointKind, KinematicTree, Pose};
+use hingecast_geom::{Joint, JointKind, KinematicTree};
 use std::collections::HashMap;
 
 /// Samples count as independent evidence in groups of this size: neighbours share their noise.
@@ -52,7 +53,7 @@ pub fn doubts(
         out.push("nothing moves: one part without joints".to_string());
     }
     for (j, joint) in tree.joints.iter().enumerate() {
-        let members: Vec<(Sample, usize)> = members(evidence, found, joint.child);
+        let members = members(evidence, &found.labels, joint.child);
         let (rival, nats) = rival(evidence, tree, j, &members, seed);
         let rival = rival.joints[j].screw.kind;
         if nats < REFUTED {
@@ -103,11 +104,6 @@ fn name(kind: JointKind) -> &'static str {
         JointKind::Fixed => "fixed",
         _ => "a hinge",
     }
-}
-
-fn members(evidence: &Evidence, found: &Settled, part: usize) -> Vec<(Sample, usize)> {
-    let own = evidence.samples.iter().zip(&found.labels).filter(|(_, l)| **l as usize == part);
-    own.map(|(s, _)| (*s, part)).collect()
 }
 
 /// The tree with joint `j` of the other type, fitted as well as it can be, and how many nats it is behind.
@@ -206,8 +202,7 @@ fn second_piece(evidence: &Evidence, found: &Settled, clouds: &[Vec<u8>], joint:
 /// States in which too little of the part is confirmed.
 fn unseen_states(evidence: &Evidence, found: &Settled, joint: &Joint, members: &[(Sample, usize)]) -> Vec<usize> {
     let n = evidence.n_states();
-    let poses: Vec<Pose> = (0..n).map(|s| found.tree.poses_at(s)[joint.child]).collect();
-    let between = evidence.between(&poses);
+    let between = evidence.between(&poses_of(&found.tree, joint.child, n));
     let stride = members.len().div_ceil(2000).max(1);
     let (mut confirmed, mut asked) = (vec![0usize; n], vec![0usize; n]);
     for (s, _) in members.iter().step_by(stride) {

@@ -1,10 +1,11 @@
 //! Candidates for a new part on one parent: pairs of states, hypotheses, alignment, and a question to all states.
 
+use super::cameras::mean_point;
 use super::evidence::{Evidence, Motion, Sample, Verdict};
 use super::hypotheses::{Duel, Hypothesis, distinct, nearest_screw};
 use super::jury::Jury;
 use super::plausible::plausibility;
-use super::scan::{Scan, centroid, points, scan, whole_range};
+use super::scan::{Scan, points, scan, whole_range};
 use super::space::TAKEN;
 use crate::icp;
 use hingecast_geom::{JointKind, Pose, Screw};
@@ -172,7 +173,9 @@ fn align(
             continue;
         }
         for kind in [JointKind::Revolute, JointKind::Prismatic] {
-            let Some((screw, q)) = nearest_screw(&pose, kind, centroid(&crowd)) else { continue };
+            let Some((screw, q)) = nearest_screw(&pose, kind, mean_point(crowd.iter().map(|s| s.point))) else {
+                continue;
+            };
             let (exact, near) = (Motion::from(pose), Motion::from(screw.motion(q)));
             let off = |s: &Sample| exact.apply(s.point).distance(near.apply(s.point)) > 3.0 * evidence.lattice.voxel;
             if 2 * crowd.iter().filter(|s| off(s)).count() > crowd.len() {

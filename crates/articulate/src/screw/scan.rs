@@ -2,7 +2,7 @@
 
 use super::evidence::{Evidence, Motion, Sample};
 use super::space::{FREE, TAKEN, facing_bit};
-use glam::{DVec3, Vec3};
+use glam::Vec3;
 use hingecast_geom::{Pose, Screw};
 
 /// Value per state and how well the states agree.
@@ -80,11 +80,6 @@ fn at_least(evidence: &Evidence, state: usize, samples: &[Sample], m: &Motion, f
 /// Values worth trying: all turns, or slides across the object.
 pub fn whole_range(screw: &Screw, extent: f32) -> [f64; 2] {
     if screw.kind.turns() { [-std::f64::consts::PI, std::f64::consts::PI] } else { [-extent as f64, extent as f64] }
-}
-
-/// Mean position.
-pub fn centroid(samples: &[Sample]) -> DVec3 {
-    samples.iter().map(|s| s.point.as_dvec3()).sum::<DVec3>() / samples.len().max(1) as f64
 }
 
 /// Points of samples.

@@ -2,13 +2,13 @@
 //! joints refined together.
 
 use super::adopt::asked_again;
+use super::cameras::{mean_point, without_mean};
 use super::discover::{Discovery, poses_of};
 use super::doubts::{REFUTED, rival};
 use super::evidence::{Evidence, Motion, Sample, Verdict, contradictions};
 use super::refine::{Report, Settings, refine};
 use crate::icp::{self, Surface};
-use glam::{DVec3, Vec3};
-use hingecast_geom::pose::{quat_from_rotation_vector, rotation_vector};
+use glam::Vec3;
 use hingecast_geom::{KinematicTree, Pose};
 use rayon::prelude::*;
 
@@ -58,21 +58,37 @@ pub fn settle(evidence: &mut Evidence, found: &Discovery, seed: u64) -> Settled 
         let gate = if round == 0 { 1.0 } else { 0.6 } * voxel;
         let settings = Settings { gates: [gate, 0.5 * gate], rounds: 6, partners: 6 };
         report = refine(evidence, &mut tree, &members, &free, &settings, seed ^ round);
-        let verdicts: Vec<Vec<Verdict>> =
-            (0..tree.parts.len()).map(|p| evidence.judge(&poses_of(&tree, p, n_states))).collect();
-        labels = label(evidence, &verdicts);
+        labels = label(evidence, &judge_all(evidence, &tree));
     }
     tidy(&mut tree);
     Settled { tree, labels, rig, report }
 }
 
+/// The verdicts on every sample under every part.
+fn judge_all(evidence: &Evidence, tree: &KinematicTree) -> Vec<Vec<Verdict>> {
+    (0..tree.parts.len()).map(|p| evidence.judge(&poses_of(tree, p, evidence.n_states()))).collect()
+}
+
+/// Samples that carry the label of a part.
+pub fn members(evidence: &Evidence, labels: &[u8], part: usize) -> Vec<(Sample, usize)> {
+    let own = evidence.samples.iter().zip(labels).filter(|(_, l)| **l as usize == part);
+    own.map(|(s, _)| (*s, part)).collect()
+}
+
+/// What it costs to give a sample to a part with this verdict.
+fn cost(v: &Verdict) -> f32 {
+    2.0 * v.against.count_ones() as f32 - v.support.count_ones() as f32
+}
+
+/// The cheapest part; ties go to the lowest, the base.
+fn cheapest(n_parts: usize, cost: impl Fn(usize) -> f32) -> u8 {
+    (0..n_parts).fold(0, |best, p| if cost(p) < cost(best) - 1e-3 { p } else { best }) as u8
+}
+
 /// The part of every sample: fewest contradictions, most support, smoothed over neighbours of the same state.
 pub fn label(evidence: &Evidence, verdicts: &[Vec<Verdict>]) -> Vec<u8> {
     let n = verdicts[0].len();
-    let mut costs: Vec<Vec<f32>> = verdicts
-        .iter()
-        .map(|part| part.iter().map(|v| 2.0 * v.against.count_ones() as f32 - v.support.count_ones() as f32).collect())
-        .collect();
+    let mut costs: Vec<Vec<f32>> = verdicts.iter().map(|part| part.iter().map(cost).collect()).collect();
     for _ in 0..SMOOTHING {
         costs = costs
             .iter()
@@ -86,10 +102,7 @@ pub fn label(evidence: &Evidence, verdicts: &[Vec<Verdict>]) -> Vec<u8> {
             })
             .collect();
     }
-    // Ties go to the base.
-    let best =
-        |i: usize| (0..costs.len()).fold(0, |best, p| if costs[p][i] < costs[best][i] - 1e-3 { p } else { best }) as u8;
-    (0..n).map(best).collect()
+    (0..n).map(|i| cheapest(costs.len(), |p| costs[p][i])).collect()
 }
 
 /// Asks all states for the value of every joint once more, now that all parts are known.
@@ -101,12 +114,11 @@ fn ask_again(evidence: &mut Evidence, tree: &mut KinematicTree, labels: &[u8], s
         // What the other parts explain must not hold this one.
         let others: Vec<Vec<Pose>> = (0..poses.len()).filter(|p| *p != child).map(|p| poses[p].clone()).collect();
         evidence.mark_taken(&others);
-        let own = evidence.samples.iter().zip(labels).filter(|(_, l)| **l as usize == child);
-        let mut members: Vec<Sample> = own.map(|(s, _)| *s).collect();
-        fastrand::Rng::with_seed(seed ^ j as u64).shuffle(&mut members);
-        members.truncate(ASKING);
-        if !members.is_empty() {
-            tree.joints[j].values = asked_again(evidence, &tree.joints[j], &members, &poses[parent]);
+        let mut asking: Vec<Sample> = members(evidence, labels, child).into_iter().map(|m| m.0).collect();
+        fastrand::Rng::with_seed(seed ^ j as u64).shuffle(&mut asking);
+        asking.truncate(ASKING);
+        if !asking.is_empty() {
+            tree.joints[j].values = asked_again(evidence, &tree.joints[j], &asking, &poses[parent]);
         }
     }
 }
@@ -116,15 +128,14 @@ const FAR: f64 = 2.0;
 
 /// Turns hinges that lie far away into slides where a slide explains the recording as well.
 fn slides(evidence: &Evidence, tree: &mut KinematicTree, labels: &[u8], seed: u64) {
-    let centre = evidence.samples.iter().map(|s| s.point.as_dvec3()).sum::<DVec3>() / evidence.samples.len() as f64;
+    let centre = mean_point(evidence.samples.iter().map(|s| s.point));
     for j in 0..tree.joints.len() {
         let joint = &tree.joints[j];
         if !joint.screw.kind.turns() || joint.screw.distance(centre) < FAR * evidence.extent() as f64 {
             continue;
         }
-        let own = evidence.samples.iter().zip(labels).filter(|(_, l)| **l as usize == joint.child);
-        let members: Vec<(Sample, usize)> = own.map(|(s, _)| (*s, joint.child)).collect();
-        let (slide, nats) = rival(evidence, tree, j, &members, seed);
+        let own = members(evidence, labels, joint.child);
+        let (slide, nats) = rival(evidence, tree, j, &own, seed);
         if nats < REFUTED {
             *tree = slide;
         }
@@ -137,9 +148,7 @@ const ASKING: usize = 500;
 /// Drops parts that the others make superfluous: those without children that explain less than they cost. Answers the
 /// verdicts of what is left.
 fn prune(evidence: &Evidence, tree: &mut KinematicTree, cost: f64) -> Vec<Vec<Verdict>> {
-    let n_states = evidence.n_states();
-    let mut verdicts: Vec<Vec<Verdict>> =
-        (0..tree.parts.len()).map(|p| evidence.judge(&poses_of(tree, p, n_states))).collect();
+    let mut verdicts = judge_all(evidence, tree);
     loop {
         let gain = |p: usize| {
             let mut without = verdicts.clone();
@@ -178,10 +187,9 @@ pub fn label_clouds(evidence: &Evidence, tree: &KinematicTree) -> Vec<Vec<u8>> {
             let cloud = &evidence.clouds[state];
             let n = cloud.points.len();
             let sample = |i: usize| Sample { state, point: cloud.points[i], normal: cloud.normals[i] };
-            let cost = |v: Verdict| 2.0 * v.against.count_ones() as f32 - v.support.count_ones() as f32;
             let mut costs: Vec<Vec<f32>> = (0..n)
                 .into_par_iter()
-                .map(|i| between.iter().map(|b| cost(evidence.ask_all(&sample(i), &b[state]))).collect())
+                .map(|i| between.iter().map(|b| cost(&evidence.ask_all(&sample(i), &b[state]))).collect())
                 .collect();
             let near: Vec<Vec<u32>> = (0..n).into_par_iter().map(|i| cloud.k_nearest(cloud.points[i], NEAR)).collect();
             for _ in 0..SMOOTHING {
@@ -196,8 +204,7 @@ pub fn label_clouds(evidence: &Evidence, tree: &KinematicTree) -> Vec<Vec<u8>> {
                     })
                     .collect();
             }
-            let best = |c: &Vec<f32>| (0..c.len()).fold(0, |b, p| if c[p] < c[b] - 1e-3 { p } else { b }) as u8;
-            costs.iter().map(best).collect()
+            costs.iter().map(|c| cheapest(c.len(), |p| c[p])).collect()
         })
         .collect()
 }
@@ -216,6 +223,7 @@ fn frames(evidence: &Evidence, labels: &[u8], seed: u64) -> Vec<Pose> {
         })
         .collect();
     let voxel = evidence.lattice.voxel as f64;
+    let centre = mean_point(own.iter().flatten().map(|s| s.point));
     let mut out = vec![Pose::IDENTITY; n_states];
     for _ in 0..3 {
         // Everything that stands still, seen by all states together.
@@ -237,21 +245,9 @@ fn frames(evidence: &Evidence, labels: &[u8], seed: u64) -> Vec<Pose> {
                 icp::align_tethered(&points, &normals, &all, *pose, &[voxel, voxel, 0.6 * voxel, 0.6 * voxel], TETHER).0
             })
             .collect();
-        out = centred(&out, &own);
+        out = without_mean(&out, centre);
     }
     out
-}
-
-/// Takes the mean turn and shift out.
-fn centred(poses: &[Pose], own: &[Vec<Sample>]) -> Vec<Pose> {
-    let all = own.iter().flatten().fold((DVec3::ZERO, 0.0), |(sum, n), s| (sum + s.point.as_dvec3(), n + 1.0));
-    let centre = all.0 / f64::max(all.1, 1.0);
-    let n = poses.len() as f64;
-    let turn = poses.iter().map(|c| rotation_vector(c.rot)).sum::<DVec3>() / n;
-    let shift = poses.iter().map(|c| c.apply(centre) - centre).sum::<DVec3>() / n;
-    let rot = quat_from_rotation_vector(turn);
-    let back = Pose::new(rot, centre + shift - rot * centre).inverse();
-    poses.iter().map(|c| back * *c).collect()
 }
 
 /// Values count from the first state, mostly upwards; limits are what was seen.

@@ -13,9 +13,15 @@ pub fn match_parts(
     found_tree: &KinematicTree,
     true_tree: &KinematicTree,
 ) -> Vec<Option<usize>> {
-    let sample = |m: &TriMesh| m.sample_surface(3000, 1).into_iter().map(|s| s.0).collect::<Vec<_>>();
-    let points = |meshes: &[TriMesh]| meshes.iter().map(sample).collect::<Vec<_>>();
-    match_points(&points(found), &points(truth), found_tree, true_tree)
+    match_points(&surface_points(found), &surface_points(truth), found_tree, true_tree)
+}
+
+/// Points per part that it is matched by.
+pub const POINTS: usize = 3000;
+
+/// [`POINTS`] points on each surface.
+pub fn surface_points(meshes: &[TriMesh]) -> Vec<Vec<Vec3>> {
+    meshes.iter().map(|m| m.sample_surface(POINTS, 1).into_iter().map(|s| s.0).collect()).collect()
 }
 
 /// The same from points on the parts' surfaces.

@@ -62,27 +62,11 @@ pub fn evaluate(run: &Path, truth: &Path, progress: &Progress) -> Result<Evaluat
     let folder = RunFolder::open(run)?;
     let truth = Truth::open(truth)?;
     let twin: run::TwinFile = read_json(&folder.folder("twin").join("twin.json"))?;
-    let recording = Recording::open(&folder.record.recording)?;
-    if recording.n_states != truth.n_states {
-        return Err(Failure::new(
-            format!("the recording has {} states, the truth {}", recording.n_states, truth.n_states),
-            truth.root.display().to_string(),
-            "give the truth of this run's recording: <RECORDING>.truth",
-        ));
-    }
-    if recording.name != truth.object {
-        return Err(Failure::new(
-            format!("the recording shows '{}', the truth is of '{}'", recording.name, truth.object),
-            truth.root.display().to_string(),
-            "give the truth of this run's recording: <RECORDING>.truth",
-        ));
-    }
+    let recording = recording_of(&folder, &truth)?;
     let cache = ViewCache::new(&recording, 512 << 20);
 
     // Everything in the reference state, world frame: state 0.
-    let true_poses = truth.tree.poses_at(0);
-    let true_meshes: Vec<TriMesh> =
-        truth.part_meshes()?.iter().zip(&true_poses).map(|(m, pose)| m.transformed(pose)).collect();
+    let true_meshes = reference_meshes(&truth)?;
     let found_meshes = twin.meshes(&folder.folder("twin"))?;
     progress.report(1, 10, "")?;
 
@@ -114,6 +98,32 @@ pub fn evaluate(run: &Path, truth: &Path, progress: &Progress) -> Result<Evaluat
     };
     write_json(&run.join("eval.json"), &evaluation)?;
     Ok(evaluation)
+}
+
+/// The run's recording, if the truth is of it.
+fn recording_of(folder: &RunFolder, truth: &Truth) -> Result<Recording> {
+    let recording = Recording::open(&folder.record.recording)?;
+    if recording.n_states != truth.n_states {
+        return Err(Failure::new(
+            format!("the recording has {} states, the truth {}", recording.n_states, truth.n_states),
+            truth.root.display().to_string(),
+            "give the truth of this run's recording: <RECORDING>.truth",
+        ));
+    }
+    if recording.name != truth.object {
+        return Err(Failure::new(
+            format!("the recording shows '{}', the truth is of '{}'", recording.name, truth.object),
+            truth.root.display().to_string(),
+            "give the truth of this run's recording: <RECORDING>.truth",
+        ));
+    }
+    Ok(recording)
+}
+
+/// The true parts in the reference state, world frame.
+fn reference_meshes(truth: &Truth) -> Result<Vec<TriMesh>> {
+    let poses = truth.tree.poses_at(0);
+    Ok(truth.part_meshes()?.iter().zip(&poses).map(|(mesh, pose)| mesh.transformed(pose)).collect())
 }
 
 /// Share of true parts whose matched part hangs on the match of the true parent (roots on nothing).

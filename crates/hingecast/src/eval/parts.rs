@@ -1,14 +1,12 @@
 //! Parts and joints alone, right after the stage that finds them: minutes instead of hours for a whole grid of protocols.
 
 use super::joints::{JointErrors, errors};
-use super::matching::match_points;
-use super::tree_accuracy;
+use super::matching::{POINTS, match_points, surface_points};
+use super::{recording_of, reference_meshes, tree_accuracy};
 use crate::failure::Result;
 use crate::pipeline::screw;
 use crate::stage::RunFolder;
-use glam::Vec3;
 use hingecast_capture::Truth;
-use hingecast_geom::TriMesh;
 use serde::{Deserialize, Serialize};
 use std::path::Path;
 
@@ -25,9 +23,6 @@ pub struct PartsEvaluation {
     pub doubts: Vec<String>,
 }
 
-/// Points per part that it is matched by.
-const POINTS: usize = 3000;
-
 /// Evaluates the stage `parts` of `run` (method `screw`).
 ///
 /// # Errors
@@ -35,11 +30,10 @@ const POINTS: usize = 3000;
 pub fn evaluate_parts(run: &Path, truth: &Path) -> Result<PartsEvaluation> {
     let folder = RunFolder::open(run)?;
     let truth = Truth::open(truth)?;
+    recording_of(&folder, &truth)?;
     let found = screw::load(run)?;
-    let poses = truth.tree.poses_at(0);
-    let meshes: Vec<TriMesh> = truth.part_meshes()?.iter().zip(&poses).map(|(m, p)| m.transformed(p)).collect();
-    let sample = |m: &TriMesh| m.sample_surface(POINTS, 1).into_iter().map(|s| s.0).collect::<Vec<Vec3>>();
-    let true_points: Vec<Vec<Vec3>> = meshes.iter().map(sample).collect();
+    let meshes = reference_meshes(&truth)?;
+    let true_points = surface_points(&meshes);
     let found_points = screw::canonical_points(run, &found.tree, POINTS)?;
     let matching = match_points(&found_points, &true_points, &found.tree, &truth.tree);
     Ok(PartsEvaluation {

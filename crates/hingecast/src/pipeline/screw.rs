@@ -10,8 +10,8 @@ use glam::Vec3;
 use hingecast_articulate::screw::{self, Labelled, cloud, doubts::Rival, refine::Report};
 use hingecast_capture::{Split, View};
 use hingecast_geom::ply::{read_vertices, write_float_vertices};
-use hingecast_geom::{Gaussians, KinematicTree, PointTree, Pose};
-use hingecast_splat::{Engine, FitConfig, SurfaceSample, Target, Views, from_surface, surface_samples};
+use hingecast_geom::{KinematicTree, PointTree, Pose};
+use hingecast_splat::{Engine, SurfaceSample, Target, Views, from_surface, surface_samples};
 use hingecast_twin::{BACKGROUND, UNKNOWN};
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
@@ -141,21 +141,10 @@ pub fn run_splat(context: &Context, run: &Path, at: &Path) -> Result<()> {
     let get = |i: usize| targets[i].clone();
     let pose = |i: usize| poses[state_of(i)].clone();
     let views = Views { count: targets.len(), get: &get, poses: Some(&pose) };
-    let checkpoint = at.join("checkpoint.bin");
-    let config = FitConfig {
-        iterations: context.config.fit.steps,
-        seed: context.config.seed,
-        checkpoint: Some(checkpoint.clone()),
-        ..Default::default()
-    };
-    let report = hingecast_splat::fit(&mut engine, &views, &config, &progress)?;
-    write_json(&at.join("fit.json"), &serde_json::json!({ "training_psnr": report.psnr, "steps": report.iterations }))?;
-    let gaussians: Gaussians = engine.gaussians();
+    let gaussians = splat::fit(context, engine, &views, at, &progress)?;
     gaussians.write_ply(&at.join("gaussians.ply"))?;
     write_json(&at.join("groups.json"), &Groups { labels: groups.iter().map(|g| *g as u8).collect() })?;
-    write_json(&at.join("extent.json"), &extent)?;
-    let _ = std::fs::remove_file(checkpoint);
-    Ok(())
+    write_json(&at.join("extent.json"), &extent)
 }
 
 /// Most views that are fitted: more of them say little that is new, and each costs memory.

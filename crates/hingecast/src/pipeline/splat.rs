@@ -95,7 +95,10 @@ pub fn run(context: &Context, at: &Path) -> Result<()> {
     let diagonal = (hi - lo).length();
     let targets: Vec<_> = targets(context, 0)?.into_iter().map(Arc::new).collect();
     let progress = context.ui.stage("splat");
-    let gaussians = fit(context, &targets, at, &progress)?;
+    let get = |i: usize| targets[i].clone();
+    let views = Views { count: targets.len(), get: &get, poses: None };
+    let first = initialise(&views, context.config.fit.gaussians, context.config.seed)?;
+    let gaussians = fit(context, Engine::from_gaussians(&first, context.threads)?, &views, at, &progress)?;
     gaussians.write_ply(&at.join("gaussians.ply"))?;
     write_json(&at.join("extent.json"), &Extent { lo: lo.to_array(), hi: hi.to_array(), diagonal })
 }
@@ -114,21 +117,16 @@ pub fn load(run: &Path) -> Result<(Gaussians, Extent)> {
     Ok((Gaussians::read_ply(&at.join("gaussians.ply"))?, crate::stage::read_json(&at.join("extent.json"))?))
 }
 
-/// Fits the gaussians; a killed fit goes on from its checkpoint in `at`.
-fn fit(context: &Context, targets: &[Arc<Target>], at: &Path, progress: &Progress) -> Result<Gaussians> {
-    let settings = &context.config.fit;
-    let get = |i: usize| targets[i].clone();
-    let views = Views { count: targets.len(), get: &get, poses: None };
-    let first = initialise(&views, settings.gaussians, context.config.seed)?;
-    let mut engine = Engine::from_gaussians(&first, context.threads)?;
+/// Fits the engine's gaussians to the views; a killed fit goes on from its checkpoint in `at`.
+pub fn fit(context: &Context, mut engine: Engine, views: &Views, at: &Path, progress: &Progress) -> Result<Gaussians> {
     let checkpoint = at.join("checkpoint.bin");
     let config = FitConfig {
-        iterations: settings.steps,
+        iterations: context.config.fit.steps,
         seed: context.config.seed,
         checkpoint: Some(checkpoint.clone()),
         ..Default::default()
     };
-    let report = hingecast_splat::fit(&mut engine, &views, &config, progress)?;
+    let report = hingecast_splat::fit(&mut engine, views, &config, progress)?;
     write_json(&at.join("fit.json"), &serde_json::json!({ "training_psnr": report.psnr, "steps": report.iterations }))?;
     let _ = std::fs::remove_file(checkpoint);
     Ok(engine.gaussians())

@@ -2,8 +2,7 @@
 
 use super::{Outcome, Session};
 use crate::cli::{Build, BuildSettings};
-use hingecast::config::Config;
-use hingecast::config::Method;
+use hingecast::config::{Config, Method};
 use hingecast::failure::{Failure, Result};
 use hingecast::pipeline::{self, Span, stages};
 use hingecast::report;
