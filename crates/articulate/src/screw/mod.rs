@@ -7,7 +7,8 @@
 //! hypotheses     screws from single correspondences        scan       one screw asked in all states
 //! propose        the best of these, aligned, per parent     adopt      a proposal refined into a part
 //! discover       parts one after another, by what they explain (jury) and how usual they are (plausible)
-//! settle         labels, states' frames, all joints together (refine)
+//! settle         states' frames, all joints together (refine)
+//! labels         which part a sample belongs to
 //! doubts         rivals, covariance, what was hardly seen
 //! ```
 
@@ -19,6 +20,7 @@ pub mod doubts;
 pub mod evidence;
 mod hypotheses;
 mod jury;
+pub mod labels;
 mod plausible;
 mod propose;
 pub mod refine;
@@ -108,7 +110,7 @@ pub fn run<E: From<Cancelled>>(
     for (views, rig) in cameras.iter_mut().zip(&settled.rig) {
         views.iter_mut().for_each(|c| *c = *c * rig.inverse());
     }
-    let labels = settle::label_clouds(&evidence, &settled.tree);
+    let labels = labels::label_clouds(&evidence, &settled.tree);
     let (doubts, rivals) = doubts::doubts(&evidence, &settled, &labels, discovery.unexplained, seed);
     let of_state = |(state, own): (usize, &Vec<u8>)| -> Vec<Labelled> {
         let points = &evidence.clouds[state].points;

@@ -6,6 +6,7 @@ use super::cameras::{mean_point, without_mean};
 use super::discover::{Discovery, poses_of};
 use super::doubts::{REFUTED, rival};
 use super::evidence::{Evidence, Motion, Sample, Verdict, contradictions};
+use super::labels::label;
 use super::refine::{Report, Settings, refine};
 use crate::icp::{self, Surface};
 use glam::Vec3;
@@ -22,8 +23,6 @@ pub struct Settled {
     pub report: Report,
 }
 
-/// Rounds of smoothing the labels' costs over neighbours.
-const SMOOTHING: usize = 3;
 /// Samples that hold a state's frame.
 const HOLDING: usize = 3000;
 /// Fewer samples of the base than this do not hold a state's frame.
@@ -73,36 +72,6 @@ fn judge_all(evidence: &Evidence, tree: &KinematicTree) -> Vec<Vec<Verdict>> {
 pub fn members(evidence: &Evidence, labels: &[u8], part: usize) -> Vec<(Sample, usize)> {
     let own = evidence.samples.iter().zip(labels).filter(|(_, l)| **l as usize == part);
     own.map(|(s, _)| (*s, part)).collect()
-}
-
-/// What it costs to give a sample to a part with this verdict.
-fn cost(v: &Verdict) -> f32 {
-    2.0 * v.against.count_ones() as f32 - v.support.count_ones() as f32
-}
-
-/// The cheapest part; ties go to the lowest, the base.
-fn cheapest(n_parts: usize, cost: impl Fn(usize) -> f32) -> u8 {
-    (0..n_parts).fold(0, |best, p| if cost(p) < cost(best) - 1e-3 { p } else { best }) as u8
-}
-
-/// The part of every sample: fewest contradictions, most support, smoothed over neighbours of the same state.
-pub fn label(evidence: &Evidence, verdicts: &[Vec<Verdict>]) -> Vec<u8> {
-    let n = verdicts[0].len();
-    let mut costs: Vec<Vec<f32>> = verdicts.iter().map(|part| part.iter().map(cost).collect()).collect();
-    for _ in 0..SMOOTHING {
-        costs = costs
-            .iter()
-            .map(|c| {
-                let mean = |i: usize| {
-                    let near = &evidence.neighbours[i];
-                    let sum: f32 = near.iter().map(|&j| c[j as usize]).sum();
-                    0.4 * c[i] + 0.6 * sum / near.len().max(1) as f32
-                };
-                (0..n).into_par_iter().map(mean).collect()
-            })
-            .collect();
-    }
-    (0..n).map(|i| cheapest(costs.len(), |p| costs[p][i])).collect()
 }
 
 /// Asks all states for the value of every joint once more, now that all parts are known.
@@ -173,40 +142,6 @@ fn prune(evidence: &Evidence, tree: &mut KinematicTree, cost: f64) -> Vec<Vec<Ve
         }
         verdicts.remove(part);
     }
-}
-
-/// Neighbours whose costs smooth a label.
-const NEAR: usize = 8;
-
-/// The part of every point of every state's cloud, by the same rule. [state][point]
-pub fn label_clouds(evidence: &Evidence, tree: &KinematicTree) -> Vec<Vec<u8>> {
-    let n_states = evidence.n_states();
-    let between: Vec<_> = (0..tree.parts.len()).map(|p| evidence.between(&poses_of(tree, p, n_states))).collect();
-    (0..n_states)
-        .map(|state| {
-            let cloud = &evidence.clouds[state];
-            let n = cloud.points.len();
-            let sample = |i: usize| Sample { state, point: cloud.points[i], normal: cloud.normals[i] };
-            let mut costs: Vec<Vec<f32>> = (0..n)
-                .into_par_iter()
-                .map(|i| between.iter().map(|b| cost(&evidence.ask_all(&sample(i), &b[state]))).collect())
-                .collect();
-            let near: Vec<Vec<u32>> = (0..n).into_par_iter().map(|i| cloud.k_nearest(cloud.points[i], NEAR)).collect();
-            for _ in 0..SMOOTHING {
-                costs = (0..n)
-                    .into_par_iter()
-                    .map(|i| {
-                        let mean = |p: usize| {
-                            let sum: f32 = near[i].iter().map(|&j| costs[j as usize][p]).sum();
-                            0.3 * costs[i][p] + 0.7 * sum / near[i].len().max(1) as f32
-                        };
-                        (0..between.len()).map(mean).collect()
-                    })
-                    .collect();
-            }
-            costs.iter().map(|c| cheapest(c.len(), |p| c[p])).collect()
-        })
-        .collect()
 }
 
 /// Corrections that bring the base of every state onto the base of all others; their mean is nothing.

@@ -43,6 +43,16 @@ impl Lattice {
         self.index_of(self.cell(x))
     }
 
+    /// Calls `visit` with the index of the cell that holds `x` and of the 26 around it.
+    pub fn around(&self, x: Vec3, visit: &mut dyn FnMut(usize)) {
+        let c = self.cell(x);
+        for k in 0..27 {
+            if let Some(i) = self.index_of(c + IVec3::new(k % 3 - 1, k / 3 % 3 - 1, k / 9 - 1)) {
+                visit(i);
+            }
+        }
+    }
+
     fn centre(&self, c: IVec3) -> Vec3 {
         self.lo + (c.as_vec3() + 0.5) * self.voxel
     }
@@ -137,13 +147,8 @@ impl Space {
     pub fn mark_taken(&mut self, points: &[Vec3]) {
         self.cells.iter_mut().for_each(|c| *c &= !TAKEN);
         for x in points {
-            let c = self.lattice.cell(*x);
-            for k in 0..27 {
-                let at = c + IVec3::new(k % 3 - 1, k / 3 % 3 - 1, k / 9 - 1);
-                if let Some(i) = self.lattice.index_of(at) {
-                    self.cells[i] |= TAKEN;
-                }
-            }
+            let cells = &mut self.cells;
+            self.lattice.around(*x, &mut |i| cells[i] |= TAKEN);
         }
     }
 

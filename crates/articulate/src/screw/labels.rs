@@ -1,0 +1,178 @@
+//! Which part a measured sample belongs to: the one under which all states contradict it least and confirm it most.
+//!
+//! A motion can bring a sample onto surface by chance: the underside of an open drawer, turned about the upright axis of a
+//! door, stays in its plane. So support is worth what the states *believe* about the surface that they show there:
+//! cost = 2 contradictions - sum over states of the belief that the surface met belongs to this part. Beliefs are soft-mins of the
+//! costs, smoothed over neighbours of the same state that face alike, and both are computed in turns.
+
+use super::discover::poses_of;
+use super::evidence::{Evidence, Motion, Sample, Verdict};
+use super::space::Lattice;
+use crate::icp::Surface;
+use glam::Vec3;
+use hingecast_geom::KinematicTree;
+use rayon::prelude::*;
+
+/// Rounds of smoothing over neighbours.
+const SMOOTHING: usize = 3;
+/// Turns of costs and beliefs.
+const TURNS: usize = 4;
+/// Neighbours that smooth a cost.
+const NEAR: usize = 8;
+/// Weight of a neighbour that faces elsewhere: parts often meet at a crease.
+const CREASE: f32 = 0.15;
+/// Share of its own cost that a sample keeps in a round of smoothing.
+const OWN: f32 = 0.3;
+
+/// What it costs to give a sample to a part with this verdict.
+fn cost(v: &Verdict) -> f32 {
+    2.0 * v.against.count_ones() as f32 - v.support.count_ones() as f32
+}
+
+/// The cheapest part; ties go to the lowest, the base.
+fn cheapest(n_parts: usize, cost: impl Fn(usize) -> f32) -> u8 {
+    (0..n_parts).fold(0, |best, p| if cost(p) < cost(best) - 1e-3 { p } else { best }) as u8
+}
+
+/// The part of every sample of the evidence by its verdicts alone: quick, good enough to refine joints with.
+pub fn label(evidence: &Evidence, verdicts: &[Vec<Verdict>]) -> Vec<u8> {
+    let n = verdicts[0].len();
+    let mut costs: Vec<Vec<f32>> = verdicts.iter().map(|part| part.iter().map(cost).collect()).collect();
+    for _ in 0..SMOOTHING {
+        costs = costs
+            .iter()
+            .map(|c| {
+                let mean = |i: usize| {
+                    let near = &evidence.neighbours[i];
+                    let sum: f32 = near.iter().map(|&j| c[j as usize]).sum();
+                    0.4 * c[i] + 0.6 * sum / near.len().max(1) as f32
+                };
+                (0..n).into_par_iter().map(mean).collect()
+            })
+            .collect();
+    }
+    (0..n).map(|i| cheapest(costs.len(), |p| costs[p][i])).collect()
+}
+
+/// The part of every point of every state's cloud. [state][point]
+pub fn label_clouds(evidence: &Evidence, tree: &KinematicTree) -> Vec<Vec<u8>> {
+    let (n_states, n_parts) = (evidence.n_states(), tree.parts.len());
+    let between: Vec<_> = (0..n_parts).map(|p| evidence.between(&poses_of(tree, p, n_states))).collect();
+    let verdicts: Vec<Vec<Verdict>> = (0..n_states)
+        .map(|state| {
+            let cloud = &evidence.clouds[state];
+            let ask = |k: usize| evidence.ask_all(&sample(cloud, state, k / n_parts), &between[k % n_parts][state]);
+            (0..cloud.points.len() * n_parts).into_par_iter().map(ask).collect()
+        })
+        .collect();
+    let near: Vec<Vec<Near>> = evidence.clouds.iter().map(neighbours).collect();
+    // Before anybody believes anything, all support counts.
+    let mut costs: Vec<Vec<f32>> = verdicts.iter().map(|state| state.iter().map(cost).collect()).collect();
+    for _ in 0..TURNS {
+        let smoothed = costs.iter().zip(&near).map(|(c, near)| smooth(c, near, n_parts));
+        let beliefs: Vec<Beliefs> = smoothed
+            .zip(&evidence.clouds)
+            .map(|(c, cloud)| Beliefs::new(&evidence.lattice, cloud, &c, n_parts))
+            .collect();
+        for (state, (costs, verdicts)) in costs.iter_mut().zip(&verdicts).enumerate() {
+            let cloud = &evidence.clouds[state];
+            costs.par_iter_mut().zip(verdicts).enumerate().for_each(|(k, (cost, v))| {
+                let (x, part) = (cloud.points[k / n_parts], k % n_parts);
+                *cost =
+                    2.0 * v.against.count_ones() as f32 - believed(&beliefs, x, part, v.support, &between[part][state]);
+            });
+        }
+    }
+    let labels = |(costs, near): (&Vec<f32>, &Vec<Near>)| {
+        smooth(costs, near, n_parts).chunks_exact(n_parts).map(|c| cheapest(n_parts, |p| c[p])).collect()
+    };
+    costs.iter().zip(&near).map(labels).collect()
+}
+
+fn sample(cloud: &Surface, state: usize, i: usize) -> Sample {
+    Sample { state, point: cloud.points[i], normal: cloud.normals[i] }
+}
+
+/// Sum over the states in `support` of their belief in `part` where `x` comes to lie.
+fn believed(beliefs: &[Beliefs], x: Vec3, part: usize, mut support: u64, from: &[Motion]) -> f32 {
+    let mut sum = 0.0;
+    while support != 0 {
+        let t = support.trailing_zeros() as usize;
+        support &= support - 1;
+        sum += beliefs[t].at(from[t].apply(x), part);
+    }
+    sum
+}
+
+/// A sample's neighbours and their weights, which sum to one.
+type Near = [(u32, f32); NEAR];
+
+fn neighbours(cloud: &Surface) -> Vec<Near> {
+    let of = |i: usize| {
+        let mut near = [(i as u32, 0.0); NEAR];
+        for (slot, j) in near.iter_mut().zip(cloud.k_nearest(cloud.points[i], NEAR)) {
+            let alike = cloud.normals[i].dot(cloud.normals[j as usize]);
+            *slot = (j, alike.max(CREASE));
+        }
+        let sum: f32 = near.iter().map(|n| n.1).sum();
+        near.map(|(j, w)| (j, w / sum))
+    };
+    (0..cloud.points.len()).into_par_iter().map(of).collect()
+}
+
+/// Costs [point][part], smoothed.
+fn smooth(costs: &[f32], near: &[Near], n_parts: usize) -> Vec<f32> {
+    let mut costs = costs.to_vec();
+    for _ in 0..SMOOTHING {
+        let mean = |k: usize| {
+            let (i, p) = (k / n_parts, k % n_parts);
+            let sum: f32 = near[i].iter().map(|(j, w)| w * costs[*j as usize * n_parts + p]).sum();
+            OWN * costs[k] + (1.0 - OWN) * sum
+        };
+        costs = (0..costs.len()).into_par_iter().map(mean).collect();
+    }
+    costs
+}
+
+/// One state's opinion which part the surface in a cell belongs to.
+struct Beliefs {
+    lattice: Lattice,
+    n_parts: usize,
+    /// Cell of the lattice -> row of `rows`; u32::MAX: no surface near.
+    row_of: Vec<u32>,
+    /// Sum over the samples near a cell. [row][part]
+    rows: Vec<f32>,
+    /// Their number. [row]
+    counts: Vec<f32>,
+}
+
+impl Beliefs {
+    /// `costs`: [point][part].
+    fn new(lattice: &Lattice, cloud: &Surface, costs: &[f32], n_parts: usize) -> Self {
+        let (mut row_of, mut rows, mut counts) = (vec![u32::MAX; lattice.len()], Vec::new(), Vec::new());
+        let mut own = vec![0.0; n_parts];
+        for (x, costs) in cloud.points.iter().zip(costs.chunks_exact(n_parts)) {
+            let least = costs.iter().copied().fold(f32::INFINITY, f32::min);
+            own.iter_mut().zip(costs).for_each(|(b, c)| *b = (least - c).exp());
+            let sum: f32 = own.iter().sum();
+            lattice.around(*x, &mut |cell| {
+                if row_of[cell] == u32::MAX {
+                    row_of[cell] = counts.len() as u32;
+                    counts.push(0.0);
+                    rows.resize(rows.len() + n_parts, 0.0);
+                }
+                let row = row_of[cell] as usize;
+                counts[row] += 1.0;
+                for (slot, b) in rows[row * n_parts..].iter_mut().zip(&own) {
+                    *slot += b / sum;
+                }
+            });
+        }
+        Self { lattice: *lattice, n_parts, row_of, rows, counts }
+    }
+
+    fn at(&self, x: Vec3, part: usize) -> f32 {
+        let row = self.lattice.index(x).map_or(u32::MAX, |cell| self.row_of[cell]);
+        if row == u32::MAX { 0.0 } else { self.rows[row as usize * self.n_parts + part] / self.counts[row as usize] }
+    }
+}
