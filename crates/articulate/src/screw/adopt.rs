@@ -23,8 +23,7 @@ pub fn adopt(evidence: &Evidence, tree: &mut KinematicTree, p: &Proposal, still:
     tree.joints.push(joint);
     let voxel = evidence.lattice.voxel as f64;
     let m = Motion::from(place[p.source]);
-    let world = |s: &Sample| Sample { state: p.source, point: m.apply(s.point), normal: m.rot * s.normal };
-    let crowd: Vec<Sample> = p.crowd.iter().map(world).collect();
+    let crowd: Vec<Sample> = p.crowd.iter().map(|s| Sample { state: p.source, ..s.moved(&m) }).collect();
     for gate in [3.0, 1.5] {
         polish(evidence, tree, &crowd, gate * voxel, n_states, seed);
         rescan(evidence, tree, &crowd, &place);
@@ -74,7 +73,7 @@ pub fn asked_again(evidence: &Evidence, joint: &Joint, members: &[Sample], place
         .iter()
         .map(|s| {
             let m = Motion::from((place[s.state] * joint.screw.motion(joint.values[s.state])).inverse());
-            Sample { state: s.state, point: m.apply(s.point), normal: m.rot * s.normal }
+            s.moved(&m)
         })
         .collect();
     let range = whole_range(&joint.screw, evidence.extent());

@@ -9,7 +9,7 @@ use super::adopt::adopt;
 use super::evidence::{Evidence, Motion, Sample, Verdict, contradictions};
 use super::jury::Jury;
 use super::plausible::plausibility;
-use super::propose::{MANY_STATES, Proposal, propose};
+use super::propose::{CROWD, MANY_STATES, Proposal, propose};
 use hingecast_geom::{Cancelled, KinematicTree, Pose, Progress};
 use rayon::prelude::*;
 
@@ -108,35 +108,47 @@ fn grow(evidence: &mut Evidence, node: &Node, width: usize, cost: f64, seed: u64
     let proposals: Vec<Proposal> = (0..node.tree.parts.len())
         .flat_map(|p| propose(evidence, p, &poses[p], &node.open, &node.verdicts, &jury, seed))
         .collect();
-    let mut finals: Vec<(f64, KinematicTree)> = finalists(evidence, proposals)
+    let mut finals: Vec<Final> = finalists(evidence, proposals)
         .par_iter()
         .map(|p| {
             let mut tree = node.tree.clone();
             adopt(evidence, &mut tree, p, &node.verdicts[p.parent], seed);
             let own = poses_of(&tree, tree.parts.len() - 1, n_states);
+            let verdict = evidence.judge(&own);
+            // What it explains now, not what proposed it: refining may have found another piece.
+            let explained = |i: &usize| verdict[*i].against == 0 && verdict[*i].support != 0;
+            let explained: Vec<Sample> =
+                node.open.iter().filter(|i| explained(i)).map(|&i| evidence.samples[i]).collect();
+            let back: Vec<Motion> = poses[p.parent].iter().map(|p| p.inverse().into()).collect();
+            let stride = explained.len().div_ceil(CROWD).max(1);
+            let crowd: Vec<Sample> = explained.iter().step_by(stride).map(|s| s.moved(&back[s.state])).collect();
             let joint = tree.joints.last().expect("a part was added");
-            let weight = plausibility(&joint.screw, &joint.values, joint.parent, &p.crowd, evidence.extent());
-            (jury.gain(evidence, &own, true) * weight - cost, tree)
+            let weight = plausibility(&joint.screw, &joint.values, joint.parent, &crowd, evidence.extent());
+            let merit = jury.gain(evidence, &own, true) * weight - cost;
+            Final { merit, tree, verdict, explained: explained.len() }
         })
         .collect();
-    finals.sort_by(|a, b| b.0.total_cmp(&a.0));
+    finals.sort_by(|a, b| b.merit.total_cmp(&a.merit));
     finals
         .into_iter()
-        .take(2 * width)
-        .filter_map(|(merit, tree)| {
-            let own = poses_of(&tree, tree.parts.len() - 1, n_states);
-            let verdict = evidence.judge(&own);
-            let explained = node.open.iter().filter(|&&i| verdict[i].against == 0 && verdict[i].support != 0).count();
-            if explained < least || merit <= 0.0 {
-                return None;
-            }
-            let mut verdicts = node.verdicts.clone();
-            verdicts.push(verdict);
-            let open = open_samples(&verdicts);
-            Some(Node { tree, verdicts, open, merit: node.merit + merit })
-        })
+        .filter(|f| f.explained >= least && f.merit > 0.0)
         .take(width)
+        .map(|f| {
+            let mut verdicts = node.verdicts.clone();
+            verdicts.push(f.verdict);
+            let open = open_samples(&verdicts);
+            Node { tree: f.tree, verdicts, open, merit: node.merit + f.merit }
+        })
         .collect()
+}
+
+/// A proposal, refined.
+struct Final {
+    merit: f64,
+    tree: KinematicTree,
+    verdict: Vec<Verdict>,
+    /// Open samples that it explains.
+    explained: usize,
 }
 
 /// World from canonical of a part in every state.

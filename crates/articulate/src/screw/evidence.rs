@@ -35,6 +35,12 @@ pub struct Sample {
     pub normal: Vec3,
 }
 
+impl Sample {
+    pub fn moved(&self, m: &Motion) -> Self {
+        Self { state: self.state, point: m.apply(self.point), normal: m.rot * self.normal }
+    }
+}
+
 /// Per sample, one bit a state: where its predicted place was seen empty, and where a surface was found there.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Verdict {
@@ -42,6 +48,8 @@ pub struct Verdict {
     pub support: u64,
     /// Support by surface that no known part explained when the question was asked.
     pub fresh: u64,
+    /// Support by surface that a known part could explain as well.
+    pub possible: u64,
 }
 
 /// What is left of the base's contradictions when a part moves a sample to where nobody looked: that explains most of it,
@@ -175,6 +183,10 @@ impl Evidence {
                     v.support |= 1 << t;
                     v.fresh |= 1 << t;
                 }
+                Answer::Possible => {
+                    v.support |= 1 << t;
+                    v.possible |= 1 << t;
+                }
                 Answer::Taken => v.support |= 1 << t,
                 Answer::Silent => {}
             }
@@ -220,27 +232,31 @@ impl Evidence {
         }
     }
 
-    /// Marks the surface cells that one of `parts` explains: never contradicted, and confirmed by half of the states.
+    /// Marks the surface cells that one of `parts` explains (never contradicted, and confirmed by half of the states), and
+    /// those that it could explain (never contradicted).
     pub fn mark_taken(&mut self, parts: &[Vec<Pose>]) {
         let n = self.n_states();
         let between: Vec<_> = parts.iter().map(|p| self.between(p)).collect();
-        let marks: Vec<Vec<usize>> = (0..n)
+        let marks: Vec<[Vec<Vec3>; 2]> = (0..n)
             .into_par_iter()
             .map(|state| {
                 let cloud = &self.clouds[state];
-                let taken = |&i: &usize| {
+                let mut out = [Vec::new(), Vec::new()];
+                for i in 0..cloud.points.len() {
                     let s = Sample { state, point: cloud.points[i], normal: cloud.normals[i] };
-                    between.iter().any(|b| {
-                        let v = self.ask_all(&s, &b[state]);
-                        v.against == 0 && 2 * v.support.count_ones() as usize >= n - 1
-                    })
-                };
-                (0..cloud.points.len()).filter(taken).collect()
+                    let verdicts = between.iter().map(|b| self.ask_all(&s, &b[state]));
+                    let most = verdicts.filter(|v| v.against == 0).map(|v| v.support.count_ones() as usize).max();
+                    match most {
+                        Some(most) if 2 * most >= n - 1 => out[0].push(s.point),
+                        Some(_) => out[1].push(s.point),
+                        None => {}
+                    }
+                }
+                out
             })
             .collect();
-        for (state, marks) in marks.into_iter().enumerate() {
-            let points: Vec<Vec3> = marks.into_iter().map(|i| self.clouds[state].points[i]).collect();
-            self.spaces[state].mark_taken(&points);
+        for (space, [taken, possible]) in self.spaces.iter_mut().zip(&marks) {
+            space.mark(taken, possible);
         }
     }
 }

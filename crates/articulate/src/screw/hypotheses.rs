@@ -8,7 +8,7 @@
 //! carrying the other samples along: most fail within a few look-ups.
 
 use super::evidence::{Motion, Sample};
-use super::space::{Space, TAKEN, facing_bit};
+use super::space::{Space, facing_bit};
 use glam::Vec3;
 use hingecast_geom::{JointKind, Pose, Screw};
 use rayon::prelude::*;
@@ -31,6 +31,10 @@ pub struct Duel<'a> {
     /// The moving samples of the target state, in the parent's canonical frame.
     pub reverse: Vec<Sample>,
     pub space: &'a Space,
+    /// Surface with one of these bits is no place to land.
+    pub explained: u32,
+    /// Voxels between hypotheses: a wrong motion has hundreds of near-copies that would crowd the right one out.
+    pub apart: f32,
     /// World at the target state from the parent's canonical frame.
     pub place: Motion,
 }
@@ -52,10 +56,10 @@ impl Duel<'_> {
         let x = self.place.apply(m.apply(s.point));
         let n = self.place.rot * (m.rot * s.normal);
         let bits = self.space.bits(x);
-        bits & facing_bit(n) != 0 && bits & TAKEN == 0
+        bits & facing_bit(n) != 0 && bits & self.explained == 0
     }
 
-    /// Source samples that land on untaken surface, or have landing neighbours in the grid (`slack` rings).
+    /// Source samples that land on unexplained surface, or have landing neighbours in the grid (`slack` rings).
     pub fn fitting(&self, m: &Motion, slack: usize) -> Vec<Sample> {
         let v = self.space.lattice.voxel;
         let offsets: Vec<Vec3> = if slack == 0 {
@@ -98,7 +102,7 @@ impl Duel<'_> {
                 let reach = near.len().min(4 * FIRST);
                 let first: Vec<usize> = near[..reach].iter().step_by(4).copied().collect();
                 let need = FIRST_FIT * first.len() / FIRST;
-                let mut best = Distinct::new(&marks, 3.0 * voxel, keep);
+                let mut best = Distinct::new(&marks, self.apart * voxel, keep);
                 let mut consider = |screw: Screw, q: f64| {
                     let m = Motion::from(screw.motion(q));
                     let mut misses = 0;
@@ -119,7 +123,7 @@ impl Duel<'_> {
             .collect::<Vec<_>>()
             .concat();
         found.sort_by_key(|h| std::cmp::Reverse(h.score));
-        distinct(found, &marks, 3.0 * voxel, keep)
+        distinct(found, &marks, self.apart * voxel, keep)
     }
 }
 

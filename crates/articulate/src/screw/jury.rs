@@ -17,6 +17,8 @@ const SIZE: usize = 4000;
 /// What a removed contradiction counts if a surface was only met in the grid, and if nobody saw where the sample went.
 const LOOSE: f64 = 0.3;
 const UNSEEN: f64 = 0.1;
+/// What it counts if the surface met could as well belong to a known part.
+const POSSIBLE: f64 = 0.8;
 /// States in which a sample's distance to the surface is measured.
 const MEASURED: usize = 4;
 
@@ -40,13 +42,17 @@ impl Jury {
         let each = |(s, fewest): &(Sample, f64)| {
             let v = evidence.ask_all(s, &between[s.state]);
             let removed = (fewest - v.against.count_ones() as f64).max(0.0);
-            if removed == 0.0 || v.fresh == 0 {
-                return removed * UNSEEN;
+            // A motion that is nearly right everywhere is wrong: what remains weighs on what is removed.
+            let removed = removed * (removed / fewest).powi(2);
+            let (share, met) = match (v.fresh, v.possible) {
+                (0, 0) => return removed * UNSEEN,
+                (0, possible) => (POSSIBLE, possible),
+                (fresh, _) => (1.0, fresh),
+            };
+            if removed == 0.0 || !tight {
+                return removed * share;
             }
-            if !tight {
-                return removed;
-            }
-            removed * (LOOSE + (1.0 - LOOSE) * closeness(evidence, s, &between[s.state], v.fresh))
+            removed * share * (LOOSE + (1.0 - LOOSE) * closeness(evidence, s, &between[s.state], met))
         };
         // Summed in a fixed order.
         self.members.par_iter().map(each).collect::<Vec<f64>>().iter().sum::<f64>() * self.weight

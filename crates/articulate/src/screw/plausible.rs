@@ -10,10 +10,11 @@ use hingecast_geom::{JointKind, Screw};
 const ON_BASE: f64 = 0.15;
 /// A slide where a hinge far away would do.
 const SLIDE: f64 = 0.02;
-/// A turn by half a circle loses this.
-const TURN: f64 = 0.05;
+/// A turn by half a circle loses this, and smaller turns much less: flat things look the same upside down, but few hinges
+/// open that far.
+const TURN: f64 = 0.3;
 /// An axis along the part's faces or square to them, as in nearly everything that people build.
-const FACES: f64 = 0.08;
+const FACES: f64 = 0.15;
 /// Angle between an axis and a face that counts as along it, radians.
 const ALONG: f64 = 0.03;
 /// A hinge that its part reaches.
@@ -34,7 +35,7 @@ pub fn plausibility(screw: &Screw, values: &[f64], parent: usize, crowd: &[Sampl
     if screw.kind == JointKind::Prismatic {
         return factor * (1.0 + SLIDE) * (1.0 + REACHED);
     }
-    factor *= 1.0 - TURN * ((hi - lo) / std::f64::consts::PI).min(1.0);
+    factor *= 1.0 - TURN * ((hi - lo) / std::f64::consts::PI).min(1.0).powi(4);
     let mut distances: Vec<f64> = crowd.iter().map(|s| screw.distance(s.point.as_dvec3())).collect();
     distances.sort_by(f64::total_cmp);
     let nearest = distances.get(distances.len() / 50).copied().unwrap_or(f64::INFINITY);

@@ -5,9 +5,10 @@ use super::evidence::{Evidence, Motion, Sample, Verdict};
 use super::hypotheses::{Duel, Hypothesis, distinct, nearest_screw};
 use super::jury::Jury;
 use super::plausible::plausibility;
-use super::scan::{Scan, points, scan, whole_range};
-use super::space::TAKEN;
+use super::scan::{Scan, agreement, points, scan, whole_range};
+use super::space::{POSSIBLE, TAKEN};
 use crate::icp;
+use glam::DVec3;
 use hingecast_geom::{JointKind, Pose, Screw};
 use rayon::prelude::*;
 
@@ -25,6 +26,21 @@ pub const CROWD: usize = 200;
 const FEW: usize = 12;
 /// With fewer states a flat part is free to slide in its own plane: neighbours are kept as well.
 pub const MANY_STATES: usize = 4;
+
+/// How hypotheses of a pair of states are sought.
+struct Rule {
+    /// Surface with one of these bits is no place to land.
+    explained: u32,
+    /// Voxels between hypotheses.
+    apart: f32,
+    /// Whether they are moved uphill before they are aligned.
+    climbs: bool,
+}
+
+const DENSE: Rule = Rule { explained: TAKEN, apart: 3.0, climbs: false };
+/// What an opened door shows for the first time stands still as far as anybody knows, but in two states it attracts so many
+/// wrong motions that the right one is lost. So with few states all is sought once more without it, and wider apart.
+const WIDE: Rule = Rule { explained: TAKEN | POSSIBLE, apart: 7.0, climbs: true };
 
 /// A screw on a parent, ready to become a part.
 pub struct Proposal {
@@ -63,26 +79,26 @@ pub fn propose(
     let mut all = Vec::new();
     for (k, &pair) in pairs.iter().enumerate() {
         let (b, a) = (pair / n, pair % n);
-        let into = |s: &Sample| Sample {
-            state: s.state,
-            point: Motion::from(back[s.state]).apply(s.point),
-            normal: Motion::from(back[s.state]).rot * s.normal,
-        };
         // Open samples of one state that the parent's motion would put into emptiness of the other.
         let moving = |from: usize, to: usize| -> Vec<Sample> {
             let own = |i: &&usize| evidence.samples[**i].state == from && verdict[**i].against >> to & 1 == 1;
-            open.iter().filter(own).map(|&i| into(&evidence.samples[i])).collect()
+            open.iter().filter(own).map(|&i| evidence.samples[i].moved(&back[from].into())).collect()
         };
         let (source, reverse) = (moving(b, a), moving(a, b));
         let cloud = &evidence.clouds[a];
         let m = Motion::from(back[a]);
-        let untaken = |i: &usize| evidence.spaces[a].bits(cloud.points[*i]) & TAKEN == 0;
-        let targets = (0..cloud.points.len())
-            .filter(untaken)
-            .map(|i| (m.apply(cloud.points[i]), m.rot * cloud.normals[i]))
-            .collect();
-        let duel = Duel { source, targets, reverse, space: &evidence.spaces[a], place: Motion::from(place[a]) };
-        let hypotheses = duel.propose(ALIGNED / pairs.len().min(3), seed ^ ((k as u64 + 1) << 8));
+        let (space, place_a) = (&evidence.spaces[a], Motion::from(place[a]));
+        let mut duel = Duel { source, targets: Vec::new(), reverse, space, explained: 0, apart: 0.0, place: place_a };
+        let mut hypotheses = Vec::new();
+        for rule in if n < MANY_STATES { &[DENSE, WIDE][..] } else { &[DENSE][..] } {
+            let free = |i: &usize| space.bits(cloud.points[*i]) & rule.explained == 0;
+            let targets = (0..cloud.points.len()).filter(free);
+            duel.targets = targets.map(|i| (m.apply(cloud.points[i]), m.rot * cloud.normals[i])).collect();
+            (duel.explained, duel.apart) = (rule.explained, rule.apart);
+            let found = duel.propose(ALIGNED / pairs.len().min(3), seed ^ ((k as u64 + 1) << 8));
+            hypotheses.extend(found.into_iter().map(|h| (h, rule.climbs)));
+        }
+        duel.explained = TAKEN;
         let keep = (ASKED / pairs.len()).max(6);
         let aligned = align(evidence, &duel, &hypotheses, [b, a], parent, place, &back, keep, seed);
         let asked: Vec<Proposal> = aligned
@@ -125,7 +141,7 @@ fn varied(pairs: &[usize], n: usize) -> Vec<usize> {
 fn align(
     evidence: &Evidence,
     duel: &Duel,
-    hypotheses: &[Hypothesis],
+    hypotheses: &[(Hypothesis, bool)],
     [b, a]: [usize; 2],
     parent: usize,
     place: &[Pose],
@@ -152,13 +168,20 @@ fn align(
     };
     let mut all: Vec<(Hypothesis, Pose)> = hypotheses
         .par_iter()
-        .filter_map(|h| {
+        .filter_map(|(h, climbs)| {
             let start = h.screw.motion(h.q);
             let near = some(duel.fitting(&start.into(), 1), JURY);
             if near.len() < FEW {
                 return None;
             }
-            let (pose, _) = icp::align(&points(&near), &normals(&near), &evidence.clouds[a], place[a] * start, &gates);
+            let uphill = |pose: Pose| {
+                let (forth, back) = (&jury[..jury.len().min(CLIMBING)], &reverse[..reverse.len().min(CLIMBING)]);
+                agreement(evidence, a, forth, &pose.into())
+                    + agreement(evidence, b, back, &(place[b] * pose.inverse()).into())
+            };
+            let start = place[a] * start;
+            let start = if *climbs { climb(start, &near, voxel, &uphill) } else { start };
+            let (pose, _) = icp::align(&points(&near), &normals(&near), &evidence.clouds[a], start, &gates);
             let score = met(&jury, pose.into(), a) * duel.source.len() / jury.len().max(1)
                 + met(&reverse, (place[b] * pose.inverse()).into(), b) * duel.reverse.len() / reverse.len().max(1);
             Some((Hypothesis { score, ..*h }, back[a] * pose))
@@ -206,6 +229,44 @@ fn align(
         screws = rest;
     }
     out
+}
+
+/// Steps of the climb, voxels.
+const STEPS: [f64; 3] = [4.0, 2.0, 1.0];
+/// Samples of each state that judge a step.
+const CLIMBING: usize = 150;
+
+/// Moves a pose uphill in six directions: shifts along the axes of the coordinates and turns about the samples' centre. ICP alone
+/// leaves a plate where it lies in its own plane.
+fn climb(start: Pose, samples: &[Sample], voxel: f64, agreement: &dyn Fn(Pose) -> f32) -> Pose {
+    let centre = start.apply(mean_point(samples.iter().map(|s| s.point)));
+    let far = samples.iter().map(|s| start.apply(s.point.as_dvec3()).distance_squared(centre)).sum::<f64>();
+    let radius = (far / samples.len() as f64).sqrt().max(voxel);
+    let mut best = (agreement(start), start);
+    for step in STEPS {
+        // Up to a few steps of this length.
+        for _ in 0..3 {
+            let before = best.0;
+            for k in 0..12 {
+                let axis = DVec3::AXES[k % 3] * if k % 6 < 3 { 1.0 } else { -1.0 } * step * voxel;
+                let about = best.1.apply(start.inverse().apply(centre));
+                let moved = if k < 6 {
+                    Pose { trans: best.1.trans + axis, ..best.1 }
+                } else {
+                    let turn = Screw { kind: JointKind::Revolute, axis: axis.normalize(), pivot: about };
+                    turn.motion(step * voxel / radius) * best.1
+                };
+                let there = agreement(moved);
+                if there > best.0 + 1e-4 {
+                    best = (there, moved);
+                }
+            }
+            if best.0 <= before {
+                break;
+            }
+        }
+    }
+    best.1
 }
 
 fn normals(samples: &[Sample]) -> Vec<glam::Vec3> {

@@ -1,7 +1,7 @@
 //! One screw against all states: at which value does each state agree with it, and how well.
 
 use super::evidence::{Evidence, Motion, Sample};
-use super::space::{FREE, TAKEN, facing_bit};
+use super::space::{FREE, POSSIBLE, TAKEN, facing_bit};
 use glam::Vec3;
 use hingecast_geom::{Pose, Screw};
 
@@ -18,6 +18,8 @@ pub struct Scan {
 const EMPTY: f32 = 1.5;
 /// What surface counts that a known part explains already.
 const EXPLAINED: f32 = 0.25;
+/// ... and surface that a known part could explain.
+const PERHAPS: f32 = 0.8;
 
 /// `samples`: in the parent's canonical frame as of the source state. `parent[s]`: world at s from that frame.
 /// Values from `range[0]` to `range[1]` are tried in steps that move no sample farther than about `step`.
@@ -66,7 +68,11 @@ fn at_least(evidence: &Evidence, state: usize, samples: &[Sample], m: &Motion, f
     for (k, s) in samples.iter().enumerate() {
         let bits = evidence.spaces[state].bits(m.apply(s.point));
         if bits & facing_bit(m.rot * s.normal) != 0 {
-            sum += if bits & TAKEN == 0 { 1.0 } else { EXPLAINED };
+            sum += match bits & (TAKEN | POSSIBLE) {
+                0 => 1.0,
+                POSSIBLE => PERHAPS,
+                _ => EXPLAINED,
+            };
         } else if bits & FREE != 0 {
             sum -= EMPTY;
         }

@@ -63,6 +63,8 @@ impl Lattice {
 pub enum Answer {
     /// A surface that faces the same way was measured here, and no known part explains it.
     Surface,
+    /// The same, but a known part could explain it: nothing speaks against that.
+    Possible,
     /// The same, but a known part explains it.
     Taken,
     /// Cameras looked through this place.
@@ -81,6 +83,8 @@ pub struct Space {
 pub const FREE: u32 = 1 << 27;
 /// A surface cell that a known part explains.
 pub const TAKEN: u32 = 1 << 28;
+/// A surface cell that a known part could explain: nothing speaks against it, but nobody saw it elsewhere.
+pub const POSSIBLE: u32 = 1 << 29;
 
 /// The bit of the 26 directions of a cube's faces, edges and corners that is nearest to `n`.
 #[inline]
@@ -143,12 +147,14 @@ impl Space {
         Self { lattice, cells }
     }
 
-    /// Marks the cells of `points` as explained, and unmarks all others.
-    pub fn mark_taken(&mut self, points: &[Vec3]) {
-        self.cells.iter_mut().for_each(|c| *c &= !TAKEN);
-        for x in points {
-            let cells = &mut self.cells;
-            self.lattice.around(*x, &mut |i| cells[i] |= TAKEN);
+    /// Marks the cells around these points as explained and as possibly explained, and unmarks all others.
+    pub fn mark(&mut self, taken: &[Vec3], possible: &[Vec3]) {
+        self.cells.iter_mut().for_each(|c| *c &= !(TAKEN | POSSIBLE));
+        for (points, bit) in [(taken, TAKEN), (possible, POSSIBLE)] {
+            for x in points {
+                let cells = &mut self.cells;
+                self.lattice.around(*x, &mut |i| cells[i] |= bit);
+            }
         }
     }
 
@@ -164,7 +170,11 @@ impl Space {
         let Some(i) = self.lattice.index(x) else { return Answer::Free };
         let cell = self.cells[i];
         if cell & facing_bit(n) != 0 {
-            if cell & TAKEN == 0 { Answer::Surface } else { Answer::Taken }
+            match cell & (TAKEN | POSSIBLE) {
+                0 => Answer::Surface,
+                POSSIBLE => Answer::Possible,
+                _ => Answer::Taken,
+            }
         } else if cell & FREE != 0 {
             Answer::Free
         } else {
