@@ -76,7 +76,7 @@ fn check(demos: &Demos, file: &str) -> Result<(), PolicyError> {
     check_keys(&demos.episodes, file)?;
     for (mask, names) in &demos.masks {
         for name in names {
-            if !index_of(name).is_some_and(|i| i < demos.episodes.len()) {
+            if index_of(name).is_none_or(|i| i >= demos.episodes.len()) {
                 return Err(PolicyError::new(
                     "a mask names a demonstration that is not there",
                     format!("{file}, mask/{mask}: {name}"),
