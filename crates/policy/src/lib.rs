@@ -5,6 +5,7 @@
 
 pub mod demos;
 mod error;
+pub mod net;
 
 pub use demos::{Demos, Episode};
 pub use error::PolicyError;
