@@ -51,6 +51,12 @@ impl From<hingecast_capture::CaptureError> for Failure {
     }
 }
 
+impl From<hingecast_policy::PolicyError> for Failure {
+    fn from(e: hingecast_policy::PolicyError) -> Self {
+        if e.cancelled { Cancelled.into() } else { Self::new(e.what, e.place, e.hint) }
+    }
+}
+
 impl From<hingecast_articulate::ArticulateError> for Failure {
     fn from(e: hingecast_articulate::ArticulateError) -> Self {
         use hingecast_articulate::ArticulateError as A;

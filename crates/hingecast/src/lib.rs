@@ -7,4 +7,5 @@ pub mod pipeline;
 pub mod report;
 pub mod run;
 pub mod stage;
+pub mod training;
 pub mod ui;

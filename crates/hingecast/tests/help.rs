@@ -4,7 +4,7 @@ mod common;
 
 use common::hingecast;
 
-const VERBS: [&str; 9] = ["demo", "synth", "import", "check", "build", "eval", "report", "bench", "doctor"];
+const VERBS: [&str; 10] = ["demo", "synth", "import", "check", "build", "eval", "report", "train", "bench", "doctor"];
 
 /// Flags that take a value say what holds without it; those with a unit say the unit.
 #[test]
@@ -17,7 +17,7 @@ fn every_help_text_says_defaults_and_units() {
             let name = flag.split_whitespace().next().unwrap();
             // What must be given has no default.
             let required = ["out", "truth"].contains(&name) && !["demo", "build", "bench"].contains(&verb);
-            let optional = ["config", "set", "against", "fail-under"].contains(&name);
+            let optional = ["config", "set", "against", "fail-under", "sweep"].contains(&name);
             assert!(
                 required || optional || flag.contains("default"),
                 "{verb} --{name} does not say its default\n{flag}"

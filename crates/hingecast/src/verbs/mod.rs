@@ -10,6 +10,7 @@ mod grid;
 mod import;
 mod synth;
 mod table;
+mod train;
 
 use crate::cli::{Cli, Verb};
 use hingecast::failure::Result;
@@ -57,6 +58,7 @@ pub fn run(cli: &Cli) -> Result<Outcome> {
             session.answer(&serde_json::json!({ "report": path }));
             Ok(Outcome::Done)
         }
+        Verb::Train(args) => train::run(&session, args),
         Verb::Doctor => doctor::run(&session),
     }
 }
