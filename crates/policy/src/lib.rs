@@ -1,0 +1,14 @@
+//! Demonstrations -> behaviour cloning -> a policy that acts, and the statistics of success rates.
+//!
+//! Knows no simulator: observations and actions are plain numbers. `docs/policy.md` has the formulas and says where this
+//! follows robomimic to the digit and where it does not.
+
+pub mod demos;
+mod error;
+pub mod net;
+
+pub use demos::{Demos, Episode};
+pub use error::PolicyError;
+
+/// Numbers of an action: three of translation, three of rotation (axis times angle), one of the gripper; each in [-1, 1].
+pub const ACTION_SIZE: usize = 7;

@@ -1,0 +1,60 @@
+//! Matrix products, on row-major matrices and their transposes.
+
+/// A row-major matrix, read as it is or transposed.
+#[derive(Clone, Copy)]
+pub struct Matrix<'a> {
+    data: &'a [f32],
+    rows: usize,
+    columns: usize,
+    /// Distance between rows and between columns.
+    strides: [isize; 2],
+}
+
+impl<'a> Matrix<'a> {
+    pub fn new(data: &'a [f32], rows: usize, columns: usize) -> Self {
+        assert_eq!(data.len(), rows * columns);
+        Self { data, rows, columns, strides: [columns as isize, 1] }
+    }
+
+    pub fn transposed(self) -> Self {
+        Self { rows: self.columns, columns: self.rows, strides: [self.strides[1], self.strides[0]], ..self }
+    }
+}
+
+/// c = keep c + a b. The order of each sum depends on the shapes alone. With `keep` 0 what was in `c` does not matter.
+pub fn gemm(a: Matrix, b: Matrix, keep: f32, c: &mut [f32]) {
+    let (m, k, n) = (a.rows, a.columns, b.columns);
+    assert!(k == b.rows && c.len() == m * n);
+    // Sound: the asserts above and in `Matrix::new` keep all three inside their slices; `c` is borrowed alone.
+    unsafe {
+        matrixmultiply::sgemm(
+            m,
+            k,
+            n,
+            1.0,
+            a.data.as_ptr(),
+            a.strides[0],
+            a.strides[1],
+            b.data.as_ptr(),
+            b.strides[0],
+            b.strides[1],
+            keep,
+            c.as_mut_ptr(),
+            n as isize,
+            1,
+        );
+    }
+}
+
+/// `sums` = the sum of the rows.
+pub fn sum_rows(rows: &[f32], sums: &mut [f32]) {
+    sums.fill(0.0);
+    for row in rows.chunks_exact(sums.len()) {
+        sums.iter_mut().zip(row).for_each(|(s, v)| *s += v);
+    }
+}
+
+/// Fills every row of `rows` with `row`.
+pub fn fill_rows(rows: &mut [f32], row: &[f32]) {
+    rows.chunks_exact_mut(row.len()).for_each(|r| r.copy_from_slice(row));
+}
