@@ -54,6 +54,8 @@ pub enum Verb {
     Report(Report),
     /// Record, build and evaluate a suite of objects; print the table of errors and times.
     Bench(Bench),
+    /// Record demonstrations of the robot arm opening an object or its twin; `--inspect` lists, plots and replays them.
+    Demos(Demos),
     /// Say what this machine has and lacks.
     Doctor,
 }
@@ -226,6 +228,40 @@ pub struct Bench {
     /// Delete each recording once it is evaluated (56 MB per object at the defaults).
     #[arg(long)]
     pub tidy: bool,
+}
+
+#[derive(Args, Debug)]
+pub struct Demos {
+    /// open: through half of the joint's range; close; hinged-box: the seed's two blocks, which lifting solves too.
+    #[arg(long, default_value = "open", value_parser = ["open", "close", "hinged-box"])]
+    pub task: String,
+    /// Folder or file of the object, or the name of a sample [default: covered_box; hinged_blocks for hinged-box].
+    #[arg(long, value_name = "OBJECT")]
+    pub object: Option<String>,
+    /// Record on the twin of this run instead [default: on the object].
+    #[arg(long, value_name = "RUN", conflicts_with = "object")]
+    pub twin: Option<PathBuf>,
+    /// Which joint moves, by its name in the model [default: the one that is easiest to grasp].
+    #[arg(long, value_name = "NAME")]
+    pub joint: Option<String>,
+    /// Simulated metres per unit of the model file [default: at most 1, so that the arm reaches all of the joint's way].
+    #[arg(long, value_name = "FACTOR")]
+    pub scale: Option<f64>,
+    /// Who demonstrates.
+    #[arg(long, default_value = "scripted", value_parser = ["scripted"])]
+    pub expert: String,
+    /// Successful episodes to record.
+    #[arg(short, default_value_t = 300, value_name = "N", value_parser = at_least_one)]
+    pub n: usize,
+    /// File to write, robomimic's HDF5; needed unless --inspect is given [default: none].
+    #[arg(long, short, value_name = "FILE")]
+    pub out: Option<PathBuf>,
+    /// Seed of places, starts and imperfections.
+    #[arg(long, default_value_t = 0, value_name = "N")]
+    pub seed: u64,
+    /// List and plot this file and replay it; exit 1 unless every state comes out with the same bits [default: none].
+    #[arg(long, value_name = "FILE")]
+    pub inspect: Option<PathBuf>,
 }
 
 #[cfg(test)]

@@ -6,5 +6,7 @@ pub mod failure;
 pub mod pipeline;
 pub mod report;
 pub mod run;
+#[cfg(feature = "mujoco")]
+pub mod simulate;
 pub mod stage;
 pub mod ui;

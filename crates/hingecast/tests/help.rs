@@ -4,7 +4,7 @@ mod common;
 
 use common::hingecast;
 
-const VERBS: [&str; 9] = ["demo", "synth", "import", "check", "build", "eval", "report", "bench", "doctor"];
+const VERBS: [&str; 10] = ["demo", "synth", "import", "check", "build", "eval", "report", "bench", "demos", "doctor"];
 
 /// Flags that take a value say what holds without it; those with a unit say the unit.
 #[test]

@@ -192,7 +192,13 @@ impl Env {
             position: arm.position + 0.05 * DVec3::new(a[0], a[1], a[2]),
             rotation: DMat3::from_quat(turn) * arm.rotation,
         };
-        let sign = if a[6] > 0.0 { 1.0 } else if a[6] < 0.0 { -1.0 } else { 0.0 };
+        let sign = if a[6] > 0.0 {
+            1.0
+        } else if a[6] < 0.0 {
+            -1.0
+        } else {
+            0.0
+        };
         self.gripper[0] = (self.gripper[0] - 0.2 * sign).clamp(-1.0, 1.0);
         self.gripper[1] = (self.gripper[1] + 0.2 * sign).clamp(-1.0, 1.0);
     }
@@ -288,10 +294,7 @@ impl Env {
         let joint = &self.scene.target.joint;
         let pose = body_pose(&self.data, joint.body);
         let model = &self.scene.model;
-        (
-            pose.rotate(DVec3::from(model.jnt_axis()[joint.id])),
-            pose.apply(DVec3::from(model.jnt_pos()[joint.id])),
-        )
+        (pose.rotate(DVec3::from(model.jnt_axis()[joint.id])), pose.apply(DVec3::from(model.jnt_pos()[joint.id])))
     }
 
     pub fn joint_value(&self) -> f64 {

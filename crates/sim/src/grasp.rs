@@ -54,7 +54,12 @@ type Probe = MjData<Arc<MjModel>>;
 ///
 /// # Errors
 /// When the model cannot be loaded, nothing moves, or `joint` is not there.
-pub fn candidates(path: &Path, kind: TaskKind, joint: Option<&str>, scale: Option<f64>) -> Result<Vec<Candidate>, SimError> {
+pub fn candidates(
+    path: &Path,
+    kind: TaskKind,
+    joint: Option<&str>,
+    scale: Option<f64>,
+) -> Result<Vec<Candidate>, SimError> {
     let data = alone(path, 1.0, Some(GRIPPER))?;
     let all = object::joints(data.model());
     let names: Vec<&str> = all.iter().map(|j| j.name.as_str()).collect();
@@ -200,7 +205,8 @@ impl Search {
         let mut hits: Vec<(i32, i32, DVec3, f64)> = Vec::new();
         for u in -nu..=nu {
             for v in -nv..=nv {
-                let above = closing * (cu + u as f64 * step) + side * (cv + v as f64 * step) + approach * (ca - ha - 0.2);
+                let above =
+                    closing * (cu + u as f64 * step) + side * (cv + v as f64 * step) + approach * (ca - ha - 0.2);
                 if let Some((point, width)) = self.pinch(data, above, approach, closing) {
                     hits.push((u, v, point, width));
                 }
@@ -249,7 +255,15 @@ impl Search {
     }
 
     /// Does the open hand fit there, on the way there and along the joint's way? Then: how good is it?
-    fn judge(&self, data: &mut Probe, grasp: &Pose, width: f64, room: f64, turn_wrist: bool, base: &TaskSpec) -> Option<Candidate> {
+    fn judge(
+        &self,
+        data: &mut Probe,
+        grasp: &Pose,
+        width: f64,
+        room: f64,
+        turn_wrist: bool,
+        base: &TaskSpec,
+    ) -> Option<Candidate> {
         let approach = grasp.rotate(DVec3::Z);
         pose_joint(data, &self.joint, self.closed);
         for back in APPROACH {
@@ -279,7 +293,8 @@ impl Search {
         } else {
             // A drawer is pulled in its middle, else it binds.
             let off = grasp.trans - base.part_centre;
-            1.0 - off.reject_from_normalized(self.screw.axis).length() / (self.part[1] - self.part[0]).length().max(1e-9)
+            1.0 - off.reject_from_normalized(self.screw.axis).length()
+                / (self.part[1] - self.part[0]).length().max(1e-9)
         };
         let down = f64::from(u8::from(approach.z < -0.5));
         let score = 1.2 * lever + 0.5 * down + 0.4 * room - 3.0 * width

@@ -11,12 +11,15 @@ use std::path::{Path, PathBuf};
 /// The prefix of everything of the object's inside a scene.
 pub const PREFIX: &str = "object/";
 
+/// The seed's two blocks need no file: this name stands for them.
+pub const HINGED_BLOCKS: &str = "hinged_blocks";
+
 /// The model file of `path`: a file itself, a run (its twin), a twin folder or an object folder.
 ///
 /// # Errors
 /// When nothing of that kind is there.
 pub fn model_file(path: &Path) -> Result<PathBuf, SimError> {
-    if path.is_file() {
+    if path.is_file() || path == Path::new(HINGED_BLOCKS) {
         return Ok(path.to_path_buf());
     }
     let names = ["twin/robot.xml", "robot.xml", "object.xml", "robot.urdf"];
@@ -28,7 +31,12 @@ pub fn model_file(path: &Path) -> Result<PathBuf, SimError> {
 
 /// Reads the file; `visuals` keeps what only pictures need (loading a twin's fine meshes takes seconds).
 pub(crate) fn read(path: &Path, visuals: bool) -> Result<MjSpec, SimError> {
-    let mut spec = MjSpec::from_xml(path).map_err(|e| SimError::load(path, e))?;
+    let spec = if path == Path::new(HINGED_BLOCKS) {
+        MjSpec::from_xml_string(include_str!("../assets/hinged_blocks.xml"))
+    } else {
+        MjSpec::from_xml(path)
+    };
+    let mut spec = spec.map_err(|e| SimError::load(path, e))?;
     if !visuals {
         spec.discard_visual().map_err(|e| SimError::load(path, e))?;
     }
@@ -154,7 +162,11 @@ impl Target {
         match best {
             Some((distance, target)) if distance <= reach => Ok(target),
             Some((distance, _)) => Err(SimError::task(
-                format!("no part stands where '{}' is when closed: the nearest is {:.0} mm away", task.joint, 1e3 * distance),
+                format!(
+                    "no part stands where '{}' is when closed: the nearest is {:.0} mm away",
+                    task.joint,
+                    1e3 * distance
+                ),
                 place,
                 "is this the twin of that object, recorded in the same frame?",
             )),

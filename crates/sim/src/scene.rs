@@ -8,15 +8,16 @@ use crate::object::{self, PREFIX, Target};
 use crate::spoil::{Line, Spoil};
 use crate::task::TaskSpec;
 use crate::{SimError, control::N, log};
-use glam::DVec3;
+use glam::{DQuat, DVec3};
 use hingecast_geom::Pose;
 use mujoco_rs::prelude::*;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 const ARM_ON_TABLE: &str = include_str!("../assets/arm_on_table.xml");
-/// The seed's two blocks.
-pub const HINGED_BLOCKS: &str = include_str!("../assets/hinged_blocks.xml");
+
+/// The tag of the body that carries a welded object, as MuJoCo writes it.
+const OBJECT_BODY: &str = "<body name=\"object\"";
 
 /// What a scene is made of.
 #[derive(Clone, Debug)]
@@ -85,6 +86,37 @@ impl Scene {
         let target = Target::find(&mut data, task, &place)?;
         let ids = Ids::new(&model, target.joint.body);
         Ok(Self { model, task: Arc::new(task.clone()), target, xml: Arc::new(xml), ids })
+    }
+}
+
+impl Scene {
+    /// The model as MJCF with the object where it stands in one episode, to the last digit: an episode's `model_file`.
+    pub fn xml_at(&self, place: &Pose) -> String {
+        let [x, y, z] = place.trans.to_array();
+        let q = place.rot;
+        let pose = format!("{OBJECT_BODY} pos=\"{x} {y} {z}\" quat=\"{} {} {} {}\"", q.w, q.x, q.y, q.z);
+        self.xml.replacen(OBJECT_BODY, &pose, 1)
+    }
+
+    /// Where the object stands in a text of [`Scene::xml_at`]; the identity when it stands free and its state says where.
+    ///
+    /// # Errors
+    /// When the text has an object but no place that can be read.
+    pub fn place_in(xml: &str) -> Result<Pose, SimError> {
+        let Some(at) = xml.find(OBJECT_BODY) else { return Ok(Pose::IDENTITY) };
+        let tag = &xml[at..at + xml[at..].find('>').unwrap_or(0)];
+        let numbers = |name: &str| -> Option<Vec<f64>> {
+            let from = tag.find(&format!(" {name}=\""))? + name.len() + 3;
+            tag[from..].split('"').next()?.split_whitespace().map(|n| n.parse().ok()).collect()
+        };
+        match (numbers("pos").as_deref(), numbers("quat").as_deref()) {
+            (Some(&[x, y, z]), Some(&[w, i, j, k])) => Ok(Pose::new(DQuat::from_xyzw(i, j, k, w), DVec3::new(x, y, z))),
+            _ => Err(SimError::task(
+                "the object has no place in the scene",
+                "model_file, body \"object\"",
+                "replay demonstrations that `hingecast demos` recorded",
+            )),
+        }
     }
 }
 

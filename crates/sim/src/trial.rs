@@ -45,7 +45,11 @@ pub fn make_task(path: &Path, kind: TaskKind, joint: Option<&str>, scale: Option
     match best {
         Some(made) if made.worked > 0 => Ok(made),
         Some(_) => Err(SimError::task(
-            format!("the demonstrator opened it in none of {} tries at {} places", found.len() as u64 * TRIES, found.len()),
+            format!(
+                "the demonstrator opened it in none of {} tries at {} places",
+                found.len() as u64 * TRIES,
+                found.len()
+            ),
             place,
             "--joint for another joint, or --scale for another size: it may be out of reach or stuck",
         )),

@@ -4,6 +4,8 @@ mod bench;
 mod build;
 mod check;
 mod demo;
+#[cfg(feature = "mujoco")]
+mod demos;
 mod doctor;
 mod eval;
 mod grid;
@@ -57,6 +59,20 @@ pub fn run(cli: &Cli) -> Result<Outcome> {
             session.answer(&serde_json::json!({ "report": path }));
             Ok(Outcome::Done)
         }
+        #[cfg(feature = "mujoco")]
+        Verb::Demos(args) => demos::run(&session, args),
+        #[cfg(not(feature = "mujoco"))]
+        Verb::Demos(_) => Err(without_mujoco("demos")),
         Verb::Doctor => doctor::run(&session),
     }
+}
+
+#[cfg(not(feature = "mujoco"))]
+fn without_mujoco(verb: &str) -> hingecast::failure::Failure {
+    let hint = "scripts/fetch_mujoco.sh, then build with default features";
+    hingecast::failure::Failure::new(
+        "this hingecast was built without the simulator",
+        format!("hingecast {verb}"),
+        hint,
+    )
 }
