@@ -56,6 +56,8 @@ pub enum Verb {
     Bench(Bench),
     /// Record demonstrations of the robot arm opening an object or its twin; `--inspect` lists, plots and replays them.
     Demos(Demos),
+    /// Run a policy in seeded episodes on the true object, on its twin and on spoiled ones; compare in pairs.
+    Rollout(Rollout),
     /// Say what this machine has and lacks.
     Doctor,
 }
@@ -262,6 +264,35 @@ pub struct Demos {
     /// List and plot this file and replay it; exit 1 unless every state comes out with the same bits [default: none].
     #[arg(long, value_name = "FILE")]
     pub inspect: Option<PathBuf>,
+}
+
+#[derive(Args, Debug)]
+pub struct Rollout {
+    /// Folder of the policy, the -o of `hingecast train`.
+    pub policy: PathBuf,
+    /// The true object: folder, file or name of a sample [default: what the demonstrations were recorded on].
+    #[arg(long, value_name = "OBJECT")]
+    pub object: Option<String>,
+    /// Run whose twin takes the object's place; with --object both, same seeds, compared in pairs [default: none].
+    #[arg(long, value_name = "RUN")]
+    pub twin: Option<PathBuf>,
+    /// Also on the object spoiled on purpose: axis=DEGREES, pivot=MM, limits=SHARE, edge (the hinge on the opposite edge);
+    /// joined by commas for several at once; may be repeated, each is a world of its own [default: none].
+    #[arg(long, value_name = "HOW")]
+    pub spoil: Vec<String>,
+    /// Demonstrations whose task (place, grasp, size) holds here [default: those that the policy was trained on; without
+    /// a note of them the task is made from the object].
+    #[arg(long, value_name = "FILE")]
+    pub demos: Option<PathBuf>,
+    /// Episodes in every world.
+    #[arg(short, default_value_t = 200, value_name = "N", value_parser = at_least_one)]
+    pub n: usize,
+    /// Seed of the episodes.
+    #[arg(long, default_value_t = 0, value_name = "N")]
+    pub seed: u64,
+    /// Folder for rollout.json and a strip of pictures of each kind of end [default: none, only the answer].
+    #[arg(long, short, value_name = "FOLDER")]
+    pub out: Option<PathBuf>,
 }
 
 #[cfg(test)]

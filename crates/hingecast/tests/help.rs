@@ -4,7 +4,8 @@ mod common;
 
 use common::hingecast;
 
-const VERBS: [&str; 10] = ["demo", "synth", "import", "check", "build", "eval", "report", "bench", "demos", "doctor"];
+const VERBS: [&str; 11] =
+    ["demo", "synth", "import", "check", "build", "eval", "report", "bench", "demos", "rollout", "doctor"];
 
 /// Flags that take a value say what holds without it; those with a unit say the unit.
 #[test]

@@ -12,6 +12,7 @@ pub mod expert;
 pub mod grasp;
 mod log;
 pub mod object;
+pub mod picture;
 pub mod scene;
 pub mod spoil;
 pub mod task;

@@ -2,6 +2,8 @@
 
 pub mod record;
 pub mod replay;
+pub mod rollout;
+mod strip;
 
 use crate::failure::Result;
 use hingecast_capture::object::ArticulatedObject;

@@ -10,6 +10,8 @@ mod doctor;
 mod eval;
 mod grid;
 mod import;
+#[cfg(feature = "mujoco")]
+mod rollout;
 mod synth;
 mod table;
 
@@ -63,6 +65,10 @@ pub fn run(cli: &Cli) -> Result<Outcome> {
         Verb::Demos(args) => demos::run(&session, args),
         #[cfg(not(feature = "mujoco"))]
         Verb::Demos(_) => Err(without_mujoco("demos")),
+        #[cfg(feature = "mujoco")]
+        Verb::Rollout(args) => rollout::run(&session, args),
+        #[cfg(not(feature = "mujoco"))]
+        Verb::Rollout(_) => Err(without_mujoco("rollout")),
         Verb::Doctor => doctor::run(&session),
     }
 }
