@@ -6,10 +6,15 @@
 
     scripts/policy_reference.py hdf5 OUT.hdf5          a file laid out as robomimic does: crates/policy/tests/data/robomimic.hdf5
     scripts/policy_reference.py sequences DEMOS.hdf5   reads a file of ours with robomimic's own SequenceDataset
+    scripts/policy_reference.py speed BINARY [HIDDEN] [THREADS]   training steps of crates/policy/examples/step_speed.rs
+                                                       in turns with PyTorch's
 """
 
 import json
+import statistics
+import subprocess
 import sys
+import time
 
 
 def write_hdf5(path):
@@ -59,8 +64,58 @@ def read_sequences(path):
     assert len(s) == total == sum(lengths.values())
 
 
+def actor(inputs, hidden, min_std=1e-4):
+    """robomimic's RNN-GMM actor itself, in training mode, and its loss."""
+    from collections import OrderedDict
+
+    import robomimic.models.policy_nets as policy_nets
+    import robomimic.utils.obs_utils as obs_utils
+    from robomimic.config import config_factory
+
+    obs_utils.initialize_obs_utils_with_obs_specs({"obs": {"low_dim": ["object"]}})
+    encoder = obs_utils.obs_encoder_kwargs_from_config(config_factory("bc").observation.encoder)
+    net = policy_nets.RNNGMMActorNetwork(OrderedDict(object=[inputs]), 7, [], hidden, 2, rnn_kwargs={"bidirectional": False},
+                                         num_modes=5, min_std=min_std, encoder_kwargs=encoder)
+    net.train()
+    return net, lambda x, a: -net.forward_train({"object": x}).log_prob(a).mean()
+
+
+def speed(binary, hidden="400", threads="1"):
+    """Turns of five steps each: noise of the machine hits both. Prints medians and the ratio."""
+    import torch
+
+    torch.set_num_threads(int(threads))
+    net, loss_of = actor(19, int(hidden))
+    adam = torch.optim.Adam(net.parameters(), lr=1e-4)
+    x, a = 2 * torch.rand(100, 10, 19) - 1, 2 * torch.rand(100, 10, 7) - 1
+
+    def theirs(count):
+        start = time.perf_counter()
+        for _ in range(count):
+            loss = loss_of(x, a)
+            adam.zero_grad()
+            loss.backward()
+            adam.step()
+        return 1e3 * (time.perf_counter() - start) / count
+
+    ours = subprocess.Popen([binary, hidden, threads], stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True)
+
+    def turn(count):
+        ours.stdin.write(f"{count}\n")
+        ours.stdin.flush()
+        return float(ours.stdout.readline())
+
+    theirs(5), turn(5)
+    pairs = [(turn(5), theirs(5)) for _ in range(15)]
+    mine, torchs = (statistics.median(p[k] for p in pairs) for k in range(2))
+    ratio = statistics.median(p[0] / p[1] for p in pairs)
+    best = min(p[0] for p in pairs), min(p[1] for p in pairs)
+    print(f"hidden {hidden}, {threads} threads: hingecast {mine:.1f} ms, PyTorch {torch.__version__} {torchs:.1f} ms (medians);"
+          f" ratio {ratio:.2f} (median of turns); best turns {best[0]:.1f} and {best[1]:.1f} ms")
+
+
 if __name__ == "__main__":
-    verbs = {"hdf5": write_hdf5, "sequences": read_sequences}
+    verbs = {"speed": speed, "hdf5": write_hdf5, "sequences": read_sequences}
     if len(sys.argv) < 3 or sys.argv[1] not in verbs:
         sys.exit(__doc__)
     verbs[sys.argv[1]](*sys.argv[2:])

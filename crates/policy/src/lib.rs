@@ -3,12 +3,18 @@
 //! Knows no simulator: observations and actions are plain numbers. `docs/policy.md` has the formulas and says where this
 //! follows robomimic to the digit and where it does not.
 
+mod actor;
 pub mod demos;
 mod error;
 pub mod net;
+mod policy;
+pub mod statistics;
+pub mod train;
 
+pub use actor::Actor;
 pub use demos::{Demos, Episode};
 pub use error::PolicyError;
+pub use policy::{Normalization, ObsKey, Policy, PolicyConfig};
 
 /// Numbers of an action: three of translation, three of rotation (axis times angle), one of the gripper; each in [-1, 1].
 pub const ACTION_SIZE: usize = 7;

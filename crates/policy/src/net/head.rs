@@ -121,37 +121,52 @@ fn mixture(config: &NetConfig, outputs: &mut [Vec<f32>], actions: &[f32], weight
 
 const HALF_LN_TWO_PI: f64 = 0.918_938_533_204_672_7;
 
-/// What an action in a rollout is made of.
-pub struct Sample<'a> {
-    pub rng: &'a mut fastrand::Rng,
+/// An action as robomimic takes it in evaluation: a mode by its weight, then its mean with a deviation of [`EVAL_STD`]
+/// (gmm); the mean itself (gaussian, action). `outputs`: one row per head.
+pub fn sample(config: &NetConfig, outputs: &[Vec<f32>], rng: &mut fastrand::Rng) -> [f64; ACTION_SIZE] {
+    if config.head != Head::Gmm {
+        let limit = if config.head == Head::Gaussian { MEAN_LIMIT } else { f32::INFINITY };
+        return std::array::from_fn(|d| f64::from(tanh(outputs[0][d].clamp(-limit, limit))));
+    }
+    let logits: Vec<f64> = outputs[2].iter().map(|l| f64::from(*l)).collect();
+    let total = log_sum_exp(&logits);
+    let mut left = rng.f64();
+    let mode = logits.iter().position(|l| {
+        left -= (l - total).exp();
+        left < 0.0
+    });
+    // Rounding may leave a crumb after the last mode.
+    let mode = mode.unwrap_or(logits.len() - 1);
+    std::array::from_fn(|d| f64::from(tanh(outputs[0][mode * ACTION_SIZE + d])) + EVAL_STD * normal(rng))
 }
 
-impl Sample<'_> {
-    /// Box and Muller 1958.
-    fn normal(&mut self) -> f64 {
-        let radius = (-2.0 * (1.0 - self.rng.f64()).ln()).sqrt();
-        radius * (std::f64::consts::TAU * self.rng.f64()).cos()
-    }
+/// A standard normal number (Box and Muller 1958).
+fn normal(rng: &mut fastrand::Rng) -> f64 {
+    let radius = (-2.0 * (1.0 - rng.f64()).ln()).sqrt();
+    radius * (std::f64::consts::TAU * rng.f64()).cos()
+}
 
-    /// An action as robomimic takes it in evaluation: a mode by its weight, then its mean with a deviation of
-    /// [`EVAL_STD`] (gmm); the mean itself (gaussian, action). `outputs`: one row per head.
-    pub fn action(&mut self, config: &NetConfig, outputs: &[Vec<f32>]) -> [f64; ACTION_SIZE] {
-        if config.head != Head::Gmm {
-            let limit = if config.head == Head::Gaussian { MEAN_LIMIT } else { f32::INFINITY };
-            return std::array::from_fn(|d| f64::from(tanh(outputs[0][d].clamp(-limit, limit))));
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Modes come as often as their weights say, at their means, with the small deviation around them.
+    #[test]
+    fn modes_are_drawn_by_weight() {
+        let config = NetConfig { num_modes: 3, ..Default::default() };
+        let means: Vec<f32> = (0..21).map(|k| [-1.0, 0.0, 1.0][k / 7]).collect();
+        let logits: Vec<f32> = [0.2f32, 0.5, 0.3].iter().map(|w| w.ln() + 3.0).collect();
+        let mut rng = fastrand::Rng::with_seed(1);
+        let (mut counts, mut squares, n) = ([0.0; 3], 0.0, 20_000);
+        for _ in 0..n {
+            let action = sample(&config, &[means.clone(), vec![0.0; 21], logits.clone()], &mut rng);
+            let mode = ((action[0] / 1f64.tanh()).round() + 1.0) as usize;
+            counts[mode] += 1.0 / n as f64;
+            squares += (action[3] - f64::from(means[7 * mode]).tanh()).powi(2) / n as f64;
         }
-        let logits: Vec<f64> = outputs[2].iter().map(|l| f64::from(*l)).collect();
-        let total = log_sum_exp(&logits);
-        let mut left = self.rng.f64();
-        let mode = logits.iter().position(|l| {
-            left -= (l - total).exp();
-            left < 0.0
-        });
-        // Rounding may leave a crumb after the last mode.
-        let mode = mode.unwrap_or(logits.len() - 1);
-        std::array::from_fn(|d| {
-            let mean = f64::from(tanh(outputs[0][mode * ACTION_SIZE + d]));
-            mean + EVAL_STD * self.normal()
-        })
+        for (found, weight) in counts.iter().zip([0.2, 0.5, 0.3]) {
+            assert!((found - weight).abs() < 0.015, "{counts:?}");
+        }
+        assert!((squares.sqrt() / EVAL_STD - 1.0).abs() < 0.05, "{}", squares.sqrt());
     }
 }

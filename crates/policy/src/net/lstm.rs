@@ -12,7 +12,7 @@
 //! ```
 
 use super::LstmLayer;
-use super::gemm::{Matrix, fill_rows, gemm, sum_rows};
+use super::gemm::{Matrix, fill_rows, gemm, sum_rows, transpose};
 use super::math::{sigmoid, tanh, vectorised};
 
 /// What the backward pass needs of the forward pass. B sequences, T steps, H hidden.
@@ -52,10 +52,25 @@ impl LstmMemory {
     }
 }
 
+/// The weights transposed: (inputs, 4 H) and (H, 4 H). Once per training step, for all parts of a batch.
+#[derive(Default)]
+pub struct Transposed {
+    weight_ih: Vec<f32>,
+    weight_hh: Vec<f32>,
+}
+
+impl Transposed {
+    pub fn update(&mut self, layer: &LstmLayer, parameters: &[f32]) {
+        transpose(&parameters[layer.weight_ih.clone()], layer.inputs, &mut self.weight_ih);
+        transpose(&parameters[layer.weight_hh.clone()], layer.hidden, &mut self.weight_hh);
+    }
+}
+
 /// `x`: (T B, inputs).
 pub fn forward(
     layer: &LstmLayer,
     parameters: &[f32],
+    transposed: &Transposed,
     x: &[f32],
     sequences: usize,
     steps: usize,
@@ -68,10 +83,9 @@ pub fn forward(
     bias.iter_mut().zip(b_ih.iter().zip(b_hh)).for_each(|(b, (i, h))| *b = i + h);
 
     // What the inputs say, for all steps in one product.
-    let w_ih = Matrix::new(&parameters[layer.weight_ih.clone()], 4 * h, layer.inputs);
-    let w_hh = Matrix::new(&parameters[layer.weight_hh.clone()], 4 * h, h);
+    let w_hh = Matrix::new(&transposed.weight_hh, h, 4 * h);
     fill_rows(gates, bias);
-    gemm(Matrix::new(x, rows, layer.inputs), w_ih.transposed(), 1.0, gates);
+    gemm(Matrix::new(x, rows, layer.inputs), Matrix::new(&transposed.weight_ih, layer.inputs, 4 * h), 1.0, gates);
 
     for t in 0..steps {
         let gates = &mut gates[4 * t * block..4 * (t + 1) * block];
@@ -79,7 +93,7 @@ pub fn forward(
         let (cells_before, cells_after) = cells[t * block..(t + 2) * block].split_at_mut(block);
         // The state before the first step is zero.
         if t > 0 {
-            gemm(Matrix::new(hidden_before, sequences, h), w_hh.transposed(), 1.0, gates);
+            gemm(Matrix::new(hidden_before, sequences, h), w_hh, 1.0, gates);
         }
         let tanh_cells = &mut tanh_cells[t * block..(t + 1) * block];
         for b in 0..sequences {

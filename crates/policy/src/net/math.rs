@@ -12,7 +12,7 @@ pub fn exp(x: f32) -> f32 {
     let z = x * std::f32::consts::LOG2_E + ROUND;
     let n = z - ROUND;
     // ln 2 in two pieces, the first short enough for n times it to be exact.
-    let r = x - n * 0.693_359_375 - n * -2.121_944_4e-4;
+    let r = x - n * 0.693_359_4 - n * -2.121_944_4e-4;
     let p = 1.987_569_1e-4;
     let p = p * r + 1.398_199_9e-3;
     let p = p * r + 8.333_452e-3;
@@ -37,7 +37,7 @@ pub fn tanh(x: f32) -> f32 {
     // Near 0 the difference above would lose the last digits.
     let s = x * x;
     let p = -5.704_988_7e-3;
-    let p = p * s + 2.063_908_9e-2;
+    let p = p * s + 2.063_909e-2;
     let p = p * s - 5.373_971_6e-2;
     let p = p * s + 1.333_144_2e-1;
     let p = p * s - 3.333_328e-1;

@@ -18,7 +18,7 @@ pub mod reference;
 mod step;
 
 pub use adam::Adam;
-pub use head::{EVAL_STD, Sample};
+pub use head::{EVAL_STD, sample};
 pub use network::{Batch, Workspace};
 pub use step::State;
 
@@ -69,6 +69,26 @@ impl Default for NetConfig {
             min_std: 1e-4,
             init_std: 0.1,
         }
+    }
+}
+
+impl NetConfig {
+    /// What no network can be made of: in words, with the field's name and value.
+    pub fn check(&self) -> Result<(), String> {
+        let sizes = [("rnn_layers", self.rnn_layers, 0, 16), ("num_modes", self.num_modes, 1, 1000)];
+        let hidden = [("rnn_hidden", self.rnn_hidden)].into_iter();
+        let hidden = hidden.chain(self.actor_layer_dims.iter().map(|n| ("actor_layer_dims", *n)));
+        for (name, value, least, most) in sizes.into_iter().chain(hidden.map(|(name, n)| (name, n, 1, 16_384))) {
+            if !(least..=most).contains(&value) {
+                return Err(format!("{name} = {value}, {least} to {most} is expected"));
+            }
+        }
+        for (name, value) in [("min_std", self.min_std), ("init_std", self.init_std)] {
+            if !(value > 0.0 && value <= 7.5) {
+                return Err(format!("{name} = {value}, above 0 and at most 7.5 is expected"));
+            }
+        }
+        Ok(())
     }
 }
 

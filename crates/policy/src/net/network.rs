@@ -1,7 +1,7 @@
 //! Loss and gradient of a batch: parts of it on their own threads, added in a fixed order.
 
 use super::gemm::{Matrix, fill_rows, gemm, sum_rows};
-use super::lstm::{self, LstmMemory};
+use super::lstm::{self, LstmMemory, Transposed};
 use super::{Linear, Network, head};
 use crate::ACTION_SIZE;
 use rayon::prelude::*;
@@ -22,6 +22,8 @@ pub struct Batch<'a> {
 /// Memory that one step after the other uses again.
 #[derive(Default)]
 pub struct Workspace {
+    /// Of each LSTM layer.
+    transposed: Vec<Transposed>,
     parts: Vec<Part>,
 }
 
@@ -65,6 +67,9 @@ impl Network {
         assert!(batch.actions.len() == rows * ACTION_SIZE && parameters.len() == self.parameters());
         let weight = 1.0 / rows as f64;
         workspace.parts.resize_with(batch.sequences.div_ceil(PART), Part::default);
+        workspace.transposed.resize_with(self.lstm.len(), Transposed::default);
+        self.lstm.iter().zip(&mut workspace.transposed).for_each(|(layer, t)| t.update(layer, parameters));
+        let transposed = &workspace.transposed;
         let parts = workspace.parts.par_iter_mut().enumerate();
         parts.for_each(|(i, part)| {
             let first = i * PART;
@@ -73,7 +78,7 @@ impl Network {
             part.actions.resize(sequences * batch.steps * ACTION_SIZE, 0.0);
             time_major(batch.observations, first, sequences, batch.steps, self.inputs, &mut part.x);
             time_major(batch.actions, first, sequences, batch.steps, ACTION_SIZE, &mut part.actions);
-            self.forward(parameters, sequences, batch.steps, part);
+            self.forward(parameters, transposed, sequences, batch.steps, part);
             part.loss = head::loss_and_gradient(&self.config, &mut part.heads, &part.actions, weight);
             if backward {
                 part.gradients.resize(self.parameters(), 0.0);
@@ -83,7 +88,7 @@ impl Network {
         workspace.parts.iter().map(|p| p.loss).sum()
     }
 
-    fn forward(&self, parameters: &[f32], sequences: usize, steps: usize, part: &mut Part) {
+    fn forward(&self, parameters: &[f32], transposed: &[Transposed], sequences: usize, steps: usize, part: &mut Part) {
         let rows = sequences * steps;
         let Part { x, lstm, mlp, heads, .. } = part;
         lstm.resize_with(self.lstm.len(), LstmMemory::default);
@@ -92,7 +97,7 @@ impl Network {
         for (l, layer) in self.lstm.iter().enumerate() {
             let (below, here) = lstm.split_at_mut(l);
             let input = below.last().map_or(&x[..], |m| m.output(sequences, layer.inputs));
-            lstm::forward(layer, parameters, input, sequences, steps, &mut here[0]);
+            lstm::forward(layer, parameters, &transposed[l], input, sequences, steps, &mut here[0]);
         }
         let features = self.features(x, lstm, sequences);
         for (l, layer) in self.mlp.iter().enumerate() {

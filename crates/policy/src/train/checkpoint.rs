@@ -1,0 +1,98 @@
+//! Where a training stands, in one safetensors file: weights, Adam's two means, the losses so far.
+//!
+//! Written to a temporary name and renamed. Sums are kept as bits, so that a resumed training is the same training.
+
+use crate::PolicyError;
+use crate::net::{Adam, Network};
+use crate::policy::{not_safetensors, parameters_from, tensors_to_bytes};
+use hingecast_geom::ply::write_whole;
+use safetensors::tensor::SafeTensors;
+use std::path::Path;
+
+/// Grows when the meaning of the file changes.
+const FORMAT: &str = "hingecast-training-1";
+
+/// Losses at one step.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct LossRecord {
+    pub step: usize,
+    /// Mean over the batches since the record before.
+    pub train: f64,
+    /// Over all windows of the validation demonstrations; `None` where it was not asked.
+    pub valid: Option<f64>,
+}
+
+pub struct State {
+    pub parameters: Vec<f32>,
+    pub adam: Adam,
+    /// Sum of the losses of the batches since the last record, and how many they are.
+    pub loss_sum: f64,
+    pub loss_count: usize,
+    pub history: Vec<LossRecord>,
+}
+
+impl State {
+    pub fn new(net: &Network, seed: u64) -> Self {
+        let parameters = net.initial_parameters(seed);
+        Self { adam: Adam::new(parameters.len()), parameters, loss_sum: 0.0, loss_count: 0, history: Vec::new() }
+    }
+
+    pub fn step(&self) -> usize {
+        self.adam.steps as usize
+    }
+
+    pub fn save(&self, net: &Network, stamp: &str, path: &Path) -> Result<(), PolicyError> {
+        let history: Vec<f64> =
+            self.history.iter().flat_map(|r| [r.step as f64, r.train, r.valid.unwrap_or(f64::NAN)]).collect();
+        let notes = [
+            ("format", FORMAT.to_string()),
+            ("stamp", stamp.to_string()),
+            ("step", self.adam.steps.to_string()),
+            ("loss_sum", self.loss_sum.to_bits().to_string()),
+            ("loss_count", self.loss_count.to_string()),
+        ];
+        let notes = notes.map(|(key, value)| (key.to_string(), value)).into();
+        let groups = [("", &self.parameters[..]), ("first.", &self.adam.first), ("second.", &self.adam.second)];
+        let bytes = tensors_to_bytes(net, &groups, Some(("history", &history, notes)));
+        write_whole(path, &bytes).map_err(|e| PolicyError::write(path, e))
+    }
+
+    /// `None`: there is no checkpoint, or it is one of other settings or demonstrations.
+    pub fn load(net: &Network, stamp: &str, path: &Path) -> Result<Option<Self>, PolicyError> {
+        let bytes = match std::fs::read(path) {
+            Ok(bytes) => bytes,
+            Err(e) if e.kind() == std::io::ErrorKind::NotFound => return Ok(None),
+            Err(e) => return Err(PolicyError::read(path, e)),
+        };
+        let damaged = |what: String| {
+            let hint = "delete the file to begin this training anew";
+            PolicyError::new(what, path.display().to_string(), hint)
+        };
+        let (_, metadata) = SafeTensors::read_metadata(&bytes).map_err(|e| not_safetensors(path, e))?;
+        let notes = metadata.metadata().clone().unwrap_or_default();
+        if notes.get("stamp").map(String::as_str) != Some(stamp) {
+            return Ok(None);
+        }
+        let number = |key: &str| -> Result<u64, PolicyError> {
+            let value = notes.get(key).and_then(|v| v.parse().ok());
+            value.ok_or_else(|| damaged(format!("a damaged checkpoint: no number '{key}'")))
+        };
+        let file = SafeTensors::deserialize(&bytes).map_err(|e| not_safetensors(path, e))?;
+        let history = file.tensor("history").map_err(|e| damaged(format!("a damaged checkpoint: {e}")))?;
+        let numbers: Vec<f64> =
+            history.data().chunks_exact(8).map(|b| f64::from_le_bytes(b.try_into().expect("eight bytes"))).collect();
+        let record =
+            |r: &[f64]| LossRecord { step: r[0] as usize, train: r[1], valid: Some(r[2]).filter(|v| !v.is_nan()) };
+        Ok(Some(Self {
+            parameters: parameters_from(net, &file, "", path)?,
+            adam: Adam {
+                first: parameters_from(net, &file, "first.", path)?,
+                second: parameters_from(net, &file, "second.", path)?,
+                steps: number("step")?,
+            },
+            loss_sum: f64::from_bits(number("loss_sum")?),
+            loss_count: number("loss_count")? as usize,
+            history: numbers.chunks_exact(3).map(record).collect(),
+        }))
+    }
+}
