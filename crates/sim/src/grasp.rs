@@ -1,6 +1,6 @@
 //! Where on the moving part a parallel gripper can close, found from collision geometry alone.
 //!
-//! For every way to come (from above, or level from four sides) and every direction to close in, rays ask a grid over the
+//! For every way to come (from above, or leaning from four sides) and every direction to close in, rays ask a grid over the
 //! part: what is met first, and how thick is it a little deeper? Where both fingers would meet the moving part, the open hand
 //! is put there, on the way there, and along the joint's way, and MuJoCo says whether it collides.
 //!
@@ -25,6 +25,9 @@ const WIDEST: f64 = 0.07;
 const THINNEST: f64 = 0.003;
 /// How deep the pads' middle may sit below the surface that is met first, m. The pads reach 9 mm farther.
 const DEPTHS: [f64; 3] = [0.008, 0.016, 0.024];
+/// How far the hand may lean back from pointing down when it comes from a side, rad. The sixth joint ends at 3.75 rad, 0.8 beyond
+/// the start; a level hand needs the fifth joint at its stop.
+const TILTS: [f64; 3] = [0.5, 0.75, 1.0];
 /// The last stretch of the approach must be free, m.
 const APPROACH: [f64; 3] = [0.0, 0.04, 0.09];
 /// Shares of the range at which the hand must still fit.
@@ -172,9 +175,13 @@ fn directions() -> Vec<(DVec3, DVec3)> {
     let mut out: Vec<(DVec3, DVec3)> = (0..4)
         .map(|k| (DVec3::NEG_Z, DVec3::new((k as f64 * FRAC_PI_4).cos(), (k as f64 * FRAC_PI_4).sin(), 0.0)))
         .collect();
-    for approach in [DVec3::X, DVec3::NEG_X, DVec3::Y, DVec3::NEG_Y] {
-        out.push((approach, approach.cross(DVec3::Z)));
-        out.push((approach, DVec3::Z));
+    for ahead in [DVec3::X, DVec3::NEG_X, DVec3::Y, DVec3::NEG_Y] {
+        for tilt in TILTS {
+            let approach = ahead * tilt.sin() - DVec3::Z * tilt.cos();
+            let side = ahead.cross(DVec3::Z);
+            out.push((approach, side));
+            out.push((approach, side.cross(approach)));
+        }
     }
     out
 }
@@ -284,7 +291,7 @@ impl Search {
         pose_joint(data, &self.joint, self.closed);
 
         let way = self.screw.motion(0.6 * span).apply(grasp.trans) - grasp.trans;
-        let yaw = self.best_yaw(grasp, way, base.kind)?;
+        let yaw = self.best_yaw(grasp, way)?;
         let turn = DQuat::from_rotation_z(yaw);
         let towards_arm = -(turn * way).normalize_or_zero().x;
         let lever = if self.screw.kind.turns() {
@@ -296,8 +303,8 @@ impl Search {
             1.0 - off.reject_from_normalized(self.screw.axis).length()
                 / (self.part[1] - self.part[0]).length().max(1e-9)
         };
-        let down = f64::from(u8::from(approach.z < -0.5));
-        let score = 1.2 * lever + 0.5 * down + 0.4 * room - 3.0 * width
+        // The less the hand leans, the farther the wrist is from its stops.
+        let score = 1.2 * lever - 0.6 * approach.z + 0.4 * room - 3.0 * width
             + 0.4 * towards_arm
             + if turn_wrist { 0.0 } else { 0.4 };
 
@@ -319,13 +326,12 @@ impl Search {
 
     /// Which side of the object faces the arm: the hand comes from above or away from the arm, and the way leads towards
     /// the arm, or else the wrist has to bend back on itself.
-    fn best_yaw(&self, grasp: &Pose, way: DVec3, kind: TaskKind) -> Option<f64> {
+    fn best_yaw(&self, grasp: &Pose, way: DVec3) -> Option<f64> {
         let yaws = (0..4).map(|k| k as f64 * FRAC_PI_2);
-        let level = |yaw: f64| (DQuat::from_rotation_z(yaw) * grasp.rotate(DVec3::Z)).x;
-        let fine = yaws.filter(|&y| grasp.rotate(DVec3::NEG_Z).z > 0.7 || level(y) > 0.7);
+        let approach = grasp.rotate(DVec3::Z);
+        let fine = yaws.filter(|&y| approach.z < -0.99 || (DQuat::from_rotation_z(y) * approach).x > 0.3);
         // Doors swing more outwards than sideways: the larger component decides, as rounding to quarter turns does.
         let towards = |yaw: f64| -(DQuat::from_rotation_z(yaw) * way).x;
-        let _ = kind;
         fine.max_by(|a, b| towards(*a).total_cmp(&towards(*b)))
     }
 

@@ -183,8 +183,8 @@ pub(crate) fn alone(path: &Path, scale: f64, with: Option<&str>) -> Result<MjDat
     Ok(data)
 }
 
-/// Moves the target joint of the (unscaled) specification as asked, and lets the part pass through its base: a wrong
-/// hinge would jam it there, and twins never collide with their own base either.
+/// Moves the target joint of the (unscaled) specification as asked, and nothing else: where the file lets the part collide with
+/// its base, a wrong hinge may jam it there; where it excludes that (as twins do), the part passes through.
 fn spoil(spec: &mut MjSpec, config: &SceneConfig, task: &TaskSpec) -> Result<(), SimError> {
     let path = &config.object;
     let mut data = alone(path, 1.0, None)?;
@@ -212,15 +212,6 @@ fn spoil(spec: &mut MjSpec, config: &SceneConfig, task: &TaskSpec) -> Result<(),
             }
             s => line = line.spoiled(&s, unscaled.grasp.trans, unscaled.part_centre),
         }
-    }
-    let name = |body: usize| {
-        let name = model.id_to_name(MjtObjBase::mjOBJ_BODY, body)?;
-        Some(name.strip_prefix(PREFIX).unwrap_or(name).to_string())
-    };
-    let parent = model.body_parentid()[joint.body] as usize;
-    let pair = (name(joint.body), if parent == 0 { Some("world".to_string()) } else { name(parent) });
-    if let (Some(part), Some(parent)) = pair {
-        spec.add_exclude().with_bodyname1(&part).with_bodyname2(&parent);
     }
     let entry = spec.joint_mut(&joint.name).ok_or_else(|| {
         SimError::task("the joint has no name", path.display().to_string(), "give the joint a name in the model file")
