@@ -27,7 +27,7 @@ const THINNEST: f64 = 0.003;
 const DEPTHS: [f64; 3] = [0.008, 0.016, 0.024];
 /// How far the hand may lean back from pointing down when it comes from a side, rad. The sixth joint ends at 3.75 rad, 0.8 beyond
 /// the start; a level hand needs the fifth joint at its stop.
-const TILTS: [f64; 3] = [0.5, 0.75, 1.0];
+const TILTS: [f64; 5] = [0.5, 0.75, 1.0, 1.3, FRAC_PI_2];
 /// The last stretch of the approach must be free, m.
 const APPROACH: [f64; 3] = [0.0, 0.04, 0.09];
 /// Shares of the range at which the hand must still fit.
@@ -44,11 +44,23 @@ const LARGEST: f64 = 0.75;
 /// both sides. The covered box comes out at simulation.md's x 0..0.06.
 const MIDDLE: f64 = 0.0375;
 
+/// A hand that leans stands between the arm and the grasp: so much farther away the object is put when it lies level, m.
+const BEHIND: f64 = 0.12;
+
 /// One place to hold, with the object's turn on the table.
 #[derive(Clone, Debug)]
 pub struct Candidate {
     pub task: TaskSpec,
     pub score: f64,
+}
+
+/// How large the object shall be.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Size {
+    /// Simulated metres per unit of the file.
+    Exactly(f64),
+    /// So many times what the arm reaches with ease, at most 1 metre per unit.
+    Reachable(f64),
 }
 
 type Probe = MjData<Arc<MjModel>>;
@@ -61,7 +73,7 @@ pub fn candidates(
     path: &Path,
     kind: TaskKind,
     joint: Option<&str>,
-    scale: Option<f64>,
+    size: Size,
 ) -> Result<Vec<Candidate>, SimError> {
     let data = alone(path, 1.0, Some(GRIPPER))?;
     let all = object::joints(data.model());
@@ -83,19 +95,11 @@ pub fn candidates(
     }
     let mut out = Vec::new();
     for j in all.iter().filter(|j| joint.is_none_or(|n| n == j.name)) {
-        let mut s = match scale {
-            Some(s) => s,
-            None => reachable_scale(&mut data_at(&data), j),
+        let s = match size {
+            Size::Exactly(s) => s,
+            Size::Reachable(factor) => two_digits((factor * reachable_scale(&mut data_at(&data), j)).min(1.0)),
         };
-        // A handle that is too thick for the gripper may fit when everything is smaller; three sizes are tried.
-        for _ in 0..3 {
-            let found = at_scale(path, kind, &j.name, s)?;
-            if !found.is_empty() || scale.is_some() {
-                out.extend(found);
-                break;
-            }
-            s = two_digits(0.75 * s);
-        }
+        out.extend(at_scale(path, kind, &j.name, s)?);
     }
     out.sort_by(|a, b| b.score.total_cmp(&a.score));
     Ok(distinct(out))
@@ -320,7 +324,8 @@ impl Search {
             task.grasp.rot = flipped;
         }
         let middle = turn * (grasp.trans + 0.5 * way);
-        task.place = Pose::new(turn, DVec3::new(MIDDLE - middle.x, -middle.y, TABLE - self.low));
+        let ahead = MIDDLE + BEHIND * (1.0 - approach.z * approach.z).max(0.0).sqrt();
+        task.place = Pose::new(turn, DVec3::new(ahead - middle.x, -middle.y, TABLE - self.low));
         Some(Candidate { task, score })
     }
 

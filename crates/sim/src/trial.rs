@@ -3,7 +3,7 @@
 
 use crate::env::{Env, Outcome};
 use crate::expert::Expert;
-use crate::grasp;
+use crate::grasp::{self, Size};
 use crate::scene::{Scene, SceneConfig};
 use crate::task::{TaskKind, TaskSpec};
 use crate::{SimError, object};
@@ -11,6 +11,8 @@ use std::path::Path;
 
 /// Tries per place, and how many of them must succeed to look no further.
 const TRIES: u64 = 3;
+/// Sizes that are tried, times what the arm reaches with ease: a handle may be too thick for the gripper or too near to the next.
+const SIZES: [f64; 4] = [1.0, 0.75, 1.4, 0.55];
 
 /// What was found out on the way.
 #[derive(Clone, Debug)]
@@ -26,30 +28,33 @@ pub struct Made {
 pub fn make_task(path: &Path, kind: TaskKind, joint: Option<&str>, scale: Option<f64>) -> Result<Made, SimError> {
     let path = object::model_file(path)?;
     let place = path.display().to_string();
-    let found = grasp::candidates(&path, kind, joint, scale)?;
-    let config = SceneConfig { object: path, spoil: Vec::new(), visuals: false };
+    let sizes: Vec<Size> = match scale {
+        Some(s) => vec![Size::Exactly(s)],
+        None => SIZES.iter().map(|f| Size::Reachable(*f)).collect(),
+    };
+    let config = SceneConfig { object: path.clone(), spoil: Vec::new(), visuals: false };
     let mut best: Option<Made> = None;
-    for candidate in &found {
-        let scene = Scene::new(&config, &candidate.task)?;
-        let mut env = Env::new(&scene);
-        // Seeds far from those of demonstrations and rollouts.
-        let runs = (0..TRIES).map(|k| demonstrate(&mut env, u64::MAX - k, |_, _| ()));
-        let worked = runs.collect::<Result<Vec<_>, _>>()?.iter().filter(|o| **o == Outcome::Success).count();
-        if best.as_ref().is_none_or(|b| worked > b.worked) {
-            best = Some(Made { task: candidate.task.clone(), worked, of: TRIES as usize });
-        }
-        if worked == TRIES as usize {
-            break;
+    let mut places = 0;
+    'sizes: for size in sizes {
+        for candidate in grasp::candidates(&path, kind, joint, size)? {
+            places += 1;
+            let scene = Scene::new(&config, &candidate.task)?;
+            let mut env = Env::new(&scene);
+            // Seeds far from those of demonstrations and rollouts.
+            let runs = (0..TRIES).map(|k| demonstrate(&mut env, u64::MAX - k, |_, _| ()));
+            let worked = runs.collect::<Result<Vec<_>, _>>()?.iter().filter(|o| **o == Outcome::Success).count();
+            if best.as_ref().is_none_or(|b| worked > b.worked) {
+                best = Some(Made { task: candidate.task, worked, of: TRIES as usize });
+            }
+            if worked == TRIES as usize {
+                break 'sizes;
+            }
         }
     }
     match best {
         Some(made) if made.worked > 0 => Ok(made),
         Some(_) => Err(SimError::task(
-            format!(
-                "the demonstrator opened it in none of {} tries at {} places",
-                found.len() as u64 * TRIES,
-                found.len()
-            ),
+            format!("the demonstrator opened it in none of {} tries at {places} places", TRIES * places),
             place,
             "--joint for another joint, or --scale for another size: it may be out of reach or stuck",
         )),
