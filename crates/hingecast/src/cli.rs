@@ -44,6 +44,8 @@ pub enum Verb {
     Synth(Synth),
     /// Convert a recording of another layout (nerfstudio, ArtGS, DTA, PARIS, ScrewSplat, Dynamic 3D Gaussians).
     Import(Import),
+    /// Convert an object (PartNet-Mobility, URDF) for the simulator: convex collision pieces, joints, limits, masses.
+    ImportObject(ImportObject),
     /// Say what is wrong with a recording and what to try; `--fix` repairs what is safe to repair.
     Check(Check),
     /// Build the twin of a recording. Run again to resume; finished stages are kept.
@@ -124,6 +126,22 @@ pub struct Import {
     /// Layout of the source: auto, nerfstudio, artgs, dta, paris, screwsplat or dynamic3dgs.
     #[arg(long, default_value = "auto")]
     pub format: String,
+}
+
+#[derive(Args, Debug)]
+pub struct ImportObject {
+    /// Folder or file of the object (mobility.urdf), or the name of a sample or of one in $HINGECAST_DATA.
+    pub object: String,
+    /// Object folder to write: robot.xml (MJCF), robot.urdf, meshes.
+    #[arg(long, short)]
+    pub out: PathBuf,
+    /// All lengths times this. The simulator scales by itself what its arm cannot reach; leave it when twins of the same
+    /// recordings shall fit.
+    #[arg(long, default_value_t = 1.0, value_name = "FACTOR")]
+    pub scale: f64,
+    /// Density of all parts, kg/m^3.
+    #[arg(long, default_value_t = 600.0, value_name = "DENSITY")]
+    pub density: f64,
 }
 
 #[derive(Args, Debug)]

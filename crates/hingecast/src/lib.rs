@@ -3,6 +3,7 @@
 pub mod config;
 pub mod eval;
 pub mod failure;
+pub mod import_object;
 pub mod pipeline;
 pub mod report;
 pub mod run;

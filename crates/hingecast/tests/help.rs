@@ -4,8 +4,20 @@ mod common;
 
 use common::hingecast;
 
-const VERBS: [&str; 11] =
-    ["demo", "synth", "import", "check", "build", "eval", "report", "bench", "demos", "rollout", "doctor"];
+const VERBS: [&str; 12] = [
+    "demo",
+    "synth",
+    "import",
+    "import-object",
+    "check",
+    "build",
+    "eval",
+    "report",
+    "bench",
+    "demos",
+    "rollout",
+    "doctor",
+];
 
 /// Flags that take a value say what holds without it; those with a unit say the unit.
 #[test]

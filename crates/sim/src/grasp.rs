@@ -69,12 +69,7 @@ type Probe = MjData<Arc<MjModel>>;
 ///
 /// # Errors
 /// When the model cannot be loaded, nothing moves, or `joint` is not there.
-pub fn candidates(
-    path: &Path,
-    kind: TaskKind,
-    joint: Option<&str>,
-    size: Size,
-) -> Result<Vec<Candidate>, SimError> {
+pub fn candidates(path: &Path, kind: TaskKind, joint: Option<&str>, size: Size) -> Result<Vec<Candidate>, SimError> {
     let data = alone(path, 1.0, Some(GRIPPER))?;
     let all = object::joints(data.model());
     let names: Vec<&str> = all.iter().map(|j| j.name.as_str()).collect();

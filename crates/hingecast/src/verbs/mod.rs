@@ -10,6 +10,7 @@ mod doctor;
 mod eval;
 mod grid;
 mod import;
+mod import_object;
 #[cfg(feature = "mujoco")]
 mod rollout;
 mod synth;
@@ -51,6 +52,7 @@ pub fn run(cli: &Cli) -> Result<Outcome> {
         Verb::Demo(args) => demo::run(&session, args),
         Verb::Synth(args) => synth::run(&session, args),
         Verb::Import(args) => import::run(&session, args),
+        Verb::ImportObject(args) => import_object::run(&session, args),
         Verb::Check(args) => check::run(&session, args),
         Verb::Build(args) => build::run(&session, args),
         Verb::Eval(args) => eval::run(&session, args),
