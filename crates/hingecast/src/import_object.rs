@@ -8,6 +8,7 @@
 use crate::failure::{Failure, Result};
 use glam::{DVec3, Vec3};
 use hingecast_capture::object::{ArticulatedObject, PartGeometry};
+use hingecast_capture::synth::useful_ranges;
 use hingecast_geom::{Progress, TriMesh};
 use hingecast_twin::hulls::{HullConfig, decompose};
 use hingecast_twin::{PartModel, Twin, mass};
@@ -60,6 +61,19 @@ pub fn import(source: &Path, out: &Path, config: &ImportConfig, progress: &Progr
     }
     let mut object = ArticulatedObject::load(source)?;
     let mut changes = Vec::new();
+    // The ranges that `synth` plays: files let doors swing through their cabinets.
+    let useful = useful_ranges(&object);
+    for (joint, range) in object.tree.joints.iter_mut().zip(&useful) {
+        let limits = [range.lower.min(range.upper), range.lower.max(range.upper)];
+        if limits.iter().zip(joint.limits).any(|(a, b)| (a - b).abs() > 1e-6) {
+            let [from, to] = joint.limits;
+            changes.push(format!(
+                "joint '{}' may go {:.3} .. {:.3}, not {from:.3} .. {to:.3}",
+                joint.name, limits[0], limits[1]
+            ));
+            joint.limits = limits;
+        }
+    }
     rescale(&mut object, config.scale);
     if config.scale != 1.0 {
         changes.push(format!("all lengths times {}", config.scale));
