@@ -1,11 +1,13 @@
 #!/usr/bin/env python3
 """Makes and checks the files by which the crate `policy` is compared with robomimic and PyTorch.
 
-    pip install torch h5py tqdm termcolor psutil tensorboardX imageio matplotlib; pip install --no-deps robomimic
+    pip install torch torchvision safetensors six h5py tqdm termcolor psutil tensorboardX imageio matplotlib; pip install --no-deps robomimic
     (any environment; nothing of the build needs it)
 
     scripts/policy_reference.py hdf5 OUT.hdf5          a file laid out as robomimic does: crates/policy/tests/data/robomimic.hdf5
     scripts/policy_reference.py sequences DEMOS.hdf5   reads a file of ours with robomimic's own SequenceDataset
+    scripts/policy_reference.py curve OUT.safetensors small|lift   200 steps of robomimic's actor and PyTorch's Adam: weights,
+                                                       batches, first gradient, losses (crates/policy/tests/data/curve.safetensors)
     scripts/policy_reference.py speed BINARY [HIDDEN] [THREADS]   training steps of crates/policy/examples/step_speed.rs
                                                        in turns with PyTorch's
 """
@@ -80,6 +82,42 @@ def actor(inputs, hidden, min_std=1e-4):
     return net, lambda x, a: -net.forward_train({"object": x}).log_prob(a).mean()
 
 
+def curve(path, size="small"):
+    """Trains on batches that the file holds, in their order: batch k is sequences k * batch .. + batch, counted round."""
+    import torch
+    from safetensors.torch import save_file
+
+    torch.manual_seed(0)
+    sizes = {"small": (6, 12, 5, 64, 16, 1e-3, 1e-2), "lift": (19, 400, 10, 1000, 100, 1e-4, 1e-4)}
+    inputs, hidden, steps, pool, batch, rate, min_std = sizes[size]
+    net, loss_of = actor(inputs, hidden, min_std)
+    x = 2 * torch.rand(pool, steps, inputs) - 1
+    a = torch.tanh(x @ torch.randn(inputs, 7) + 0.05 * torch.randn(pool, steps, 7))
+    # The MLP and the decoder stand in robomimic's state under a second name as well.
+    own = {k: v for k, v in net.state_dict().items() if "per_step_net" not in k}
+    out = {f"initial.policy.{k}": v.clone() for k, v in own.items()}
+    adam = torch.optim.Adam(net.parameters(), lr=rate)
+    losses = []
+    for k in range(200):
+        rows = torch.arange(k * batch, (k + 1) * batch) % pool
+        loss = loss_of(x[rows], a[rows])
+        adam.zero_grad()
+        loss.backward()
+        if k == 0:
+            out.update({f"gradient.policy.{n}": p.grad.clone() for n, p in net.named_parameters() if "per_step_net" not in n})
+        adam.step()
+        losses.append(loss.item())
+    out.update({f"final.policy.{k}": v.clone() for k, v in net.state_dict().items() if "per_step_net" not in k})
+    net.eval()
+    with torch.no_grad():
+        d = net.forward_train({"object": x[:1]})
+    out["means"], out["weights"] = d.component_distribution.base_dist.loc[0], d.mixture_distribution.probs[0]
+    out["observations"], out["actions"], out["losses"] = x, a, torch.tensor(losses, dtype=torch.float64)
+    note = {"hidden": hidden, "batch": batch, "rate": rate, "min_std": min_std, "torch": torch.__version__}
+    save_file({k: v.contiguous() for k, v in out.items()}, path, {k: str(v) for k, v in note.items()})
+    print(f"loss {losses[0]:.4f} -> {losses[-1]:.4f}")
+
+
 def speed(binary, hidden="400", threads="1"):
     """Turns of five steps each: noise of the machine hits both. Prints medians and the ratio."""
     import torch
@@ -115,7 +153,7 @@ def speed(binary, hidden="400", threads="1"):
 
 
 if __name__ == "__main__":
-    verbs = {"speed": speed, "hdf5": write_hdf5, "sequences": read_sequences}
+    verbs = {"speed": speed, "curve": curve, "hdf5": write_hdf5, "sequences": read_sequences}
     if len(sys.argv) < 3 or sys.argv[1] not in verbs:
         sys.exit(__doc__)
     verbs[sys.argv[1]](*sys.argv[2:])

@@ -54,12 +54,14 @@ pub enum Verb {
     Eval(Eval),
     /// Write the report of a run again.
     Report(Report),
-    /// Record, build and evaluate a suite of objects; print the table of errors and times.
-    Bench(Bench),
     /// Record demonstrations of the robot arm opening an object or its twin; `--inspect` lists, plots and replays them.
     Demos(Demos),
+    /// Clone a policy from demonstrations (robomimic HDF5). Run again to resume; `--sweep` tries many settings.
+    Train(Train),
     /// Run a policy in seeded episodes on the true object, on its twin and on spoiled ones; compare in pairs.
     Rollout(Rollout),
+    /// Record, build and evaluate a suite of objects; print the table of errors and times.
+    Bench(Bench),
     /// Say what this machine has and lacks.
     Doctor,
 }
@@ -214,6 +216,35 @@ pub struct Eval {
 pub struct Report {
     /// Run folder, the -o of `hingecast build`.
     pub run: PathBuf,
+}
+
+#[derive(Args, Debug)]
+pub struct Train {
+    /// Demonstrations in robomimic's HDF5 layout.
+    pub demos: PathBuf,
+    /// Policy folder to write: weights (safetensors), policy.json, losses, train.toml with all settings.
+    #[arg(long, short)]
+    pub out: PathBuf,
+    /// bc-rnn-fast: LSTM of 100, 6000 steps, minutes on two cores; bc-rnn: robomimic's settings for Lift, LSTM of 400,
+    /// 200 000 steps, hours; bc: an MLP that sees one step.
+    #[arg(long, default_value = "bc-rnn-fast", value_parser = ["bc-rnn-fast", "bc-rnn", "bc"], hide_possible_values = true)]
+    pub preset: String,
+    /// TOML file with settings; its keys beat the preset. A policy's own train.toml shows all keys with their values.
+    #[arg(long, value_name = "FILE")]
+    pub config: Option<PathBuf>,
+    /// One setting, for instance `learning_rate=3e-4` or `net.rnn_hidden=200`; beats the file. May be repeated.
+    #[arg(long = "set", value_name = "KEY=VALUE")]
+    pub set: Vec<String>,
+    /// Training steps, one batch each [default: of the preset].
+    #[arg(long, value_name = "N")]
+    pub steps: Option<usize>,
+    /// Seed of initial weights, batches and split [default: 0].
+    #[arg(long, value_name = "N")]
+    pub seed: Option<u64>,
+    /// Train once per combination of the settings in this TOML file, each in a folder of its own below OUT; as many at a time as
+    /// there are threads; table and plot at the end. docs/policy.md shows such a file.
+    #[arg(long, value_name = "FILE")]
+    pub sweep: Option<PathBuf>,
 }
 
 #[derive(Args, Debug)]

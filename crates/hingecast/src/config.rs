@@ -3,6 +3,7 @@
 use crate::failure::{Failure, Result};
 use crate::pipeline::overrides::JointOverride;
 use hingecast_articulate as articulate;
+use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
 use std::path::Path;
 
@@ -104,38 +105,8 @@ impl Config {
     /// # Errors
     /// Unknown keys, wrong types, files that are not TOML: by name.
     pub fn resolve(preset: Preset, file: Option<&Path>, set: &[String]) -> Result<Self> {
-        let mut table = toml::Table::try_from(Self::preset(preset)).expect("a config is a table");
-        if let Some(path) = file {
-            let text = std::fs::read_to_string(path).map_err(Failure::io(path))?;
-            let given: toml::Table = text.parse().map_err(|e: toml::de::Error| {
-                Failure::new(
-                    format!("not TOML: {}", e.message()),
-                    path.display().to_string(),
-                    "see config.toml of any run",
-                )
-            })?;
-            merge(&mut table, given);
-            typed(&table, &path.display().to_string())?;
-        }
-        for pair in set {
-            let (key, value) = pair.split_once('=').ok_or_else(|| {
-                Failure::new(format!("'{pair}' is not key=value"), "--set", "for instance --set fit.steps=2000")
-            })?;
-            // A bare word is a string: --set parts.cluster=hdbscan.
-            let parsed: toml::Table = format!("x = {value}")
-                .parse()
-                .or_else(|_| format!("x = {value:?}").parse())
-                .map_err(|_| Failure::new(format!("cannot read the value of '{pair}'"), "--set", "quote strings"))?;
-            let mut nested = parsed["x"].clone();
-            for part in key.rsplit('.') {
-                nested = toml::Value::Table([(part.to_string(), nested)].into_iter().collect());
-            }
-            if let toml::Value::Table(t) = nested {
-                merge(&mut table, t);
-            }
-            typed(&table, &format!("--set {pair}"))?;
-        }
-        let config = typed(&table, "--set, --config")?;
+        let words = Words { example: "fit.steps=2000", saved: "config.toml of any run" };
+        let config: Self = layered(&Self::preset(preset), file, set, &words)?;
         config.check()?;
         Ok(config)
     }
@@ -181,12 +152,62 @@ impl Config {
     }
 }
 
+/// What the errors of [`layered`] point at.
+pub struct Words<'a> {
+    /// A `--set` pair that exists.
+    pub example: &'a str,
+    /// Where all keys can be seen.
+    pub saved: &'a str,
+}
+
+/// `base`, then the file's keys, then `key=value` pairs with dots for tables.
+///
+/// # Errors
+/// Unknown keys, wrong types, files that are not TOML: by name.
+pub fn layered<T: Serialize + DeserializeOwned>(
+    base: &T,
+    file: Option<&Path>,
+    set: &[String],
+    words: &Words,
+) -> Result<T> {
+    let mut table = toml::Table::try_from(base).expect("a config is a table");
+    if let Some(path) = file {
+        let text = std::fs::read_to_string(path).map_err(Failure::io(path))?;
+        let given: toml::Table = text.parse().map_err(|e: toml::de::Error| {
+            let what = format!("not TOML: {}", e.message());
+            Failure::new(what, path.display().to_string(), format!("see {}", words.saved))
+        })?;
+        merge(&mut table, given);
+        typed::<T>(&table, &path.display().to_string(), words)?;
+    }
+    for pair in set {
+        let (key, value) = pair.split_once('=').ok_or_else(|| {
+            let hint = format!("for instance --set {}", words.example);
+            Failure::new(format!("'{pair}' is not key=value"), "--set", hint)
+        })?;
+        // A bare word is a string: --set parts.cluster=hdbscan.
+        let parsed: toml::Table = format!("x = {value}")
+            .parse()
+            .or_else(|_| format!("x = {value:?}").parse())
+            .map_err(|_| Failure::new(format!("cannot read the value of '{pair}'"), "--set", "quote strings"))?;
+        let mut nested = parsed["x"].clone();
+        for part in key.rsplit('.') {
+            nested = toml::Value::Table([(part.to_string(), nested)].into_iter().collect());
+        }
+        if let toml::Value::Table(t) = nested {
+            merge(&mut table, t);
+        }
+        typed::<T>(&table, &format!("--set {pair}"), words)?;
+    }
+    typed(&table, "--set, --config", words)
+}
+
 /// The table as a config; `place` is where its last keys came from.
-fn typed(table: &toml::Table, place: &str) -> Result<Config> {
+fn typed<T: DeserializeOwned>(table: &toml::Table, place: &str, words: &Words) -> Result<T> {
     toml::Value::Table(table.clone()).try_into().map_err(|e: toml::de::Error| {
         let what = e.message().lines().collect::<Vec<_>>().join("; ");
         let what = what.replace("usize", "a whole number from 0").replace("u32", "a whole number from 0");
-        Failure::new(what, place, "see config.toml of any run for all keys")
+        Failure::new(what, place, format!("see {} for all keys", words.saved))
     })
 }
 

@@ -51,6 +51,12 @@ impl From<hingecast_capture::CaptureError> for Failure {
     }
 }
 
+impl From<hingecast_policy::PolicyError> for Failure {
+    fn from(e: hingecast_policy::PolicyError) -> Self {
+        if e.cancelled { Cancelled.into() } else { Self::new(e.what, e.place, e.hint) }
+    }
+}
+
 impl From<hingecast_articulate::ArticulateError> for Failure {
     fn from(e: hingecast_articulate::ArticulateError) -> Self {
         use hingecast_articulate::ArticulateError as A;
@@ -83,12 +89,6 @@ impl From<hingecast_twin::ExportError> for Failure {
 impl From<hingecast_geom::ply::PlyError> for Failure {
     fn from(e: hingecast_geom::ply::PlyError) -> Self {
         Self::new(e.to_string(), "a PLY file", "build again with --fresh if it is one of the run's own files")
-    }
-}
-
-impl From<hingecast_policy::PolicyError> for Failure {
-    fn from(e: hingecast_policy::PolicyError) -> Self {
-        if e.cancelled { Cancelled.into() } else { Self::new(e.what, e.place, e.hint) }
     }
 }
 

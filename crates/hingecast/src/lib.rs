@@ -10,4 +10,5 @@ pub mod run;
 #[cfg(feature = "mujoco")]
 pub mod simulate;
 pub mod stage;
+pub mod training;
 pub mod ui;

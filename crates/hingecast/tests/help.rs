@@ -4,7 +4,7 @@ mod common;
 
 use common::hingecast;
 
-const VERBS: [&str; 12] = [
+const VERBS: [&str; 13] = [
     "demo",
     "synth",
     "import",
@@ -13,9 +13,10 @@ const VERBS: [&str; 12] = [
     "build",
     "eval",
     "report",
-    "bench",
     "demos",
+    "train",
     "rollout",
+    "bench",
     "doctor",
 ];
 
@@ -30,7 +31,7 @@ fn every_help_text_says_defaults_and_units() {
             let name = flag.split_whitespace().next().unwrap();
             // What must be given has no default.
             let required = ["out", "truth"].contains(&name) && !["demo", "build", "bench"].contains(&verb);
-            let optional = ["config", "set", "against", "fail-under"].contains(&name);
+            let optional = ["config", "set", "against", "fail-under", "sweep"].contains(&name);
             assert!(
                 required || optional || flag.contains("default"),
                 "{verb} --{name} does not say its default\n{flag}"

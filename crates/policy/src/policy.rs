@@ -178,11 +178,12 @@ pub(crate) fn normalized(x: &[f64], by: Option<&Normalization>) -> Vec<f32> {
     }
 }
 
-/// The network's tensors under its names, each group with a prefix of its own.
+/// The network's tensors under its names, each group with a prefix of its own; and one more tensor with one note, since
+/// several notes would come out in a different order every time.
 pub(crate) fn tensors_to_bytes(
     net: &Network,
     groups: &[(&str, &[f32])],
-    extra: Option<(&str, &[f64], BTreeMap<String, String>)>,
+    extra: Option<(&str, &[f64], String)>,
 ) -> Vec<u8> {
     let mut data: Vec<(String, Dtype, Vec<usize>, Vec<u8>)> = Vec::new();
     for (prefix, values) in groups {
@@ -192,10 +193,10 @@ pub(crate) fn tensors_to_bytes(
         }
     }
     let mut metadata = None;
-    if let Some((name, values, notes)) = extra {
+    if let Some((name, values, note)) = extra {
         let bytes = values.iter().flat_map(|v| v.to_le_bytes()).collect();
         data.push((name.to_string(), Dtype::F64, vec![values.len()], bytes));
-        metadata = Some(notes.into_iter().collect());
+        metadata = Some([("note".to_string(), note)].into());
     }
     let views = data.iter().map(|(name, dtype, shape, bytes)| {
         (name.as_str(), TensorView::new(*dtype, shape.clone(), bytes).expect("bytes of this shape"))

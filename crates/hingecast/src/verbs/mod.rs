@@ -15,6 +15,7 @@ mod import_object;
 mod rollout;
 mod synth;
 mod table;
+mod train;
 
 use crate::cli::{Cli, Verb};
 use hingecast::failure::Result;
@@ -71,6 +72,7 @@ pub fn run(cli: &Cli) -> Result<Outcome> {
         Verb::Rollout(args) => rollout::run(&session, args),
         #[cfg(not(feature = "mujoco"))]
         Verb::Rollout(_) => Err(without_mujoco("rollout")),
+        Verb::Train(args) => train::run(&session, args),
         Verb::Doctor => doctor::run(&session),
     }
 }

@@ -7,6 +7,7 @@ use crate::net::{Adam, Network};
 use crate::policy::{not_safetensors, parameters_from, tensors_to_bytes};
 use hingecast_geom::ply::write_whole;
 use safetensors::tensor::SafeTensors;
+use serde::{Deserialize, Serialize};
 use std::path::Path;
 
 /// Grows when the meaning of the file changes.
@@ -20,6 +21,16 @@ pub struct LossRecord {
     pub train: f64,
     /// Over all windows of the validation demonstrations; `None` where it was not asked.
     pub valid: Option<f64>,
+}
+
+/// The numbers beside the tensors, as JSON.
+#[derive(Serialize, Deserialize)]
+struct Note {
+    format: String,
+    stamp: String,
+    step: u64,
+    loss_sum_bits: u64,
+    loss_count: usize,
 }
 
 pub struct State {
@@ -44,16 +55,16 @@ impl State {
     pub fn save(&self, net: &Network, stamp: &str, path: &Path) -> Result<(), PolicyError> {
         let history: Vec<f64> =
             self.history.iter().flat_map(|r| [r.step as f64, r.train, r.valid.unwrap_or(f64::NAN)]).collect();
-        let notes = [
-            ("format", FORMAT.to_string()),
-            ("stamp", stamp.to_string()),
-            ("step", self.adam.steps.to_string()),
-            ("loss_sum", self.loss_sum.to_bits().to_string()),
-            ("loss_count", self.loss_count.to_string()),
-        ];
-        let notes = notes.map(|(key, value)| (key.to_string(), value)).into();
+        let note = Note {
+            format: FORMAT.to_string(),
+            stamp: stamp.to_string(),
+            step: self.adam.steps,
+            loss_sum_bits: self.loss_sum.to_bits(),
+            loss_count: self.loss_count,
+        };
+        let note = serde_json::to_string(&note).expect("plain data");
         let groups = [("", &self.parameters[..]), ("first.", &self.adam.first), ("second.", &self.adam.second)];
-        let bytes = tensors_to_bytes(net, &groups, Some(("history", &history, notes)));
+        let bytes = tensors_to_bytes(net, &groups, Some(("history", &history, note)));
         write_whole(path, &bytes).map_err(|e| PolicyError::write(path, e))
     }
 
@@ -69,14 +80,11 @@ impl State {
             PolicyError::new(what, path.display().to_string(), hint)
         };
         let (_, metadata) = SafeTensors::read_metadata(&bytes).map_err(|e| not_safetensors(path, e))?;
-        let notes = metadata.metadata().clone().unwrap_or_default();
-        if notes.get("stamp").map(String::as_str) != Some(stamp) {
+        let note = metadata.metadata().as_ref().and_then(|notes| notes.get("note")).map_or("", String::as_str);
+        let note: Note = serde_json::from_str(note).map_err(|e| damaged(format!("a damaged checkpoint: {e}")))?;
+        if note.stamp != stamp || note.format != FORMAT {
             return Ok(None);
         }
-        let number = |key: &str| -> Result<u64, PolicyError> {
-            let value = notes.get(key).and_then(|v| v.parse().ok());
-            value.ok_or_else(|| damaged(format!("a damaged checkpoint: no number '{key}'")))
-        };
         let file = SafeTensors::deserialize(&bytes).map_err(|e| not_safetensors(path, e))?;
         let history = file.tensor("history").map_err(|e| damaged(format!("a damaged checkpoint: {e}")))?;
         let numbers: Vec<f64> =
@@ -88,10 +96,10 @@ impl State {
             adam: Adam {
                 first: parameters_from(net, &file, "first.", path)?,
                 second: parameters_from(net, &file, "second.", path)?,
-                steps: number("step")?,
+                steps: note.step,
             },
-            loss_sum: f64::from_bits(number("loss_sum")?),
-            loss_count: number("loss_count")? as usize,
+            loss_sum: f64::from_bits(note.loss_sum_bits),
+            loss_count: note.loss_count,
             history: numbers.chunks_exact(3).map(record).collect(),
         }))
     }

@@ -1,0 +1,72 @@
+//! Losses over steps, and scores over settings, as SVG plots.
+
+use crate::report::draw::PALETTE;
+use hingecast_policy::train::LossRecord;
+use plotters::prelude::*;
+
+/// A line or, without `lines`, points.
+struct Series<'a> {
+    name: &'a str,
+    color: [u8; 3],
+    points: Vec<(f64, f64)>,
+    lines: bool,
+}
+
+/// Training and validation loss over steps.
+pub fn losses(history: &[LossRecord]) -> String {
+    let train = history.iter().map(|r| (r.step as f64, r.train)).collect();
+    let valid = history.iter().filter_map(|r| Some((r.step as f64, r.valid?))).collect();
+    let series = [
+        Series { name: "training", color: PALETTE[7], points: train, lines: true },
+        Series { name: "validation", color: PALETTE[1], points: valid, lines: true },
+    ];
+    chart(&series, "step", "loss")
+}
+
+/// Points with `x` and `y` as their axes' names.
+pub fn points(x: &str, y: &str, points: Vec<(f64, f64)>) -> String {
+    chart(&[Series { name: y, color: PALETTE[7], points, lines: false }], x, y)
+}
+
+/// Lowest and highest, a little apart even where all are equal.
+fn range(values: impl Iterator<Item = f64>) -> std::ops::Range<f64> {
+    let (lo, hi) = values.fold((f64::INFINITY, f64::NEG_INFINITY), |(lo, hi), v| (lo.min(v), hi.max(v)));
+    if !(lo <= hi) {
+        return 0.0..1.0;
+    }
+    let margin = (0.04 * (hi - lo)).max(1e-9 * lo.abs()).max(1e-9);
+    lo - margin..hi + margin
+}
+
+fn chart(series: &[Series], x: &str, y: &str) -> String {
+    let mut svg = String::new();
+    let all = || series.iter().flat_map(|s| &s.points);
+    let (x_range, y_range) = (range(all().map(|p| p.0)), range(all().map(|p| p.1)));
+    {
+        let area = SVGBackend::with_string(&mut svg, (720, 320)).into_drawing_area();
+        // Drawing into a string cannot fail.
+        let draw = || -> std::result::Result<(), Box<dyn std::error::Error>> {
+            area.fill(&WHITE)?;
+            let mut chart = ChartBuilder::on(&area)
+                .margin(8)
+                .x_label_area_size(32)
+                .y_label_area_size(60)
+                .build_cartesian_2d(x_range, y_range)?;
+            chart.configure_mesh().x_desc(x).y_desc(y).light_line_style(WHITE).draw()?;
+            for Series { name, color: [r, g, b], points, lines } in series {
+                let color = RGBColor(*r, *g, *b);
+                let drawn = if *lines {
+                    chart.draw_series(LineSeries::new(points.iter().copied(), color.stroke_width(2)))?
+                } else {
+                    chart.draw_series(points.iter().map(|p| Circle::new(*p, 4, color.filled())))?
+                };
+                drawn.label(*name).legend(move |(x, y)| Circle::new((x + 8, y), 4, color.filled()));
+            }
+            chart.configure_series_labels().background_style(WHITE.mix(0.8)).border_style(BLACK.mix(0.3)).draw()?;
+            area.present()?;
+            Ok(())
+        };
+        let _ = draw();
+    }
+    svg
+}
