@@ -245,6 +245,9 @@ pub struct Train {
     /// there are threads; table and plot at the end. docs/policy.md shows such a file.
     #[arg(long, value_name = "FILE")]
     pub sweep: Option<PathBuf>,
+    /// Episodes that every policy of a sweep is rolled out in, where the demonstrations' world is at hand; 0 = none.
+    #[arg(long, default_value_t = 50, value_name = "N")]
+    pub rollouts: usize,
 }
 
 #[derive(Args, Debug)]

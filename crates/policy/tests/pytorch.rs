@@ -45,8 +45,7 @@ fn compare(path: &Path) {
     let (observations, actions) = (reference.f32s("observations"), reference.f32s("actions"));
     let file = reference.file();
     let losses = file.tensor("losses").unwrap();
-    let losses: Vec<f64> =
-        losses.data().chunks_exact(8).map(|b| f64::from_le_bytes(b.try_into().unwrap())).collect();
+    let losses: Vec<f64> = losses.data().chunks_exact(8).map(|b| f64::from_le_bytes(b.try_into().unwrap())).collect();
 
     let sequences = reference.note("batch") as usize;
     let mut parameters = reference.all(&net, "initial");
