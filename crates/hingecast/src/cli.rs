@@ -325,7 +325,7 @@ pub struct Rollout {
     /// The true object: folder, file or name of a sample [default: what the demonstrations were recorded on].
     #[arg(long, value_name = "OBJECT")]
     pub object: Option<String>,
-    /// Run whose twin takes the object's place; with --object both, same seeds, compared in pairs [default: none].
+    /// Run whose twin takes the object's place; both given: same seeds, compared in pairs [default: none].
     #[arg(long, value_name = "RUN")]
     pub twin: Option<PathBuf>,
     /// Also on the object spoiled on purpose: axis=DEGREES, pivot=MM, limits=SHARE, edge (the hinge on the opposite edge);

@@ -4,6 +4,7 @@
 use super::record::outcome_name;
 use super::strip;
 use crate::failure::{Failure, Result};
+use glam::DVec3;
 use hingecast_geom::Progress;
 use hingecast_policy::statistics::{Comparison, Paired, wilson};
 use hingecast_policy::{Actor, Policy};
@@ -35,6 +36,8 @@ pub struct EpisodeResult {
     pub steps: usize,
     /// How far the joint moved at most, as a share of the task's (the true object's) range.
     pub moved: f64,
+    /// Where the grasped spot of the part was at the end, world frame, m.
+    pub end: [f64; 3],
 }
 
 #[derive(Clone, Debug, Serialize)]
@@ -50,6 +53,9 @@ pub struct WorldResult {
     pub median_secs_to_success: Option<f64>,
     /// Mean over all episodes, share of the true range: wrong limits cannot hide behind it.
     pub mean_moved: f64,
+    /// Median distance of the grasped spot from where it ended in the first world, same seed, both successes, mm. A compliant arm
+    /// opens many a wrong hinge; where the part then is tells it.
+    pub end_gap_mm: Option<f64>,
     /// Against the first world: its rate minus this one's.
     pub against_first: Option<Comparison>,
     pub results: Vec<EpisodeResult>,
@@ -122,7 +128,8 @@ fn episode(
         steps += 1;
     }
     each(env);
-    Ok(EpisodeResult { seed, outcome: env.outcome(), steps, moved: env.moved_of_true_range() })
+    let (outcome, moved, end) = (env.outcome(), env.moved_of_true_range(), env.grasp().trans.to_array());
+    Ok(EpisodeResult { seed, outcome, steps, moved, end })
 }
 
 fn summarise(world: &World, results: Vec<EpisodeResult>, first: Option<&WorldResult>) -> WorldResult {
@@ -130,12 +137,16 @@ fn summarise(world: &World, results: Vec<EpisodeResult>, first: Option<&WorldRes
     let successes = won.iter().filter(|w| **w).count();
     let mut outcomes = BTreeMap::new();
     results.iter().for_each(|r| *outcomes.entry(r.outcome).or_default() += 1);
-    let mut times: Vec<usize> = results.iter().filter(|r| r.outcome == Outcome::Success).map(|r| r.steps).collect();
-    times.sort_unstable();
     let against_first = first.map(|f| {
         let theirs: Vec<bool> = f.results.iter().map(|r| r.outcome == Outcome::Success).collect();
         Paired::count(&theirs, &won).compare()
     });
+    let end_gap_mm = first.and_then(|f| {
+        let both = |(a, b): &(&EpisodeResult, &EpisodeResult)| [a, b].iter().all(|r| r.outcome == Outcome::Success);
+        let gap = |(a, b): (&EpisodeResult, &EpisodeResult)| 1e3 * DVec3::from(a.end).distance(DVec3::from(b.end));
+        median(f.results.iter().zip(&results).filter(both).map(gap).collect())
+    });
+    let secs = results.iter().filter(|r| r.outcome == Outcome::Success).map(|r| r.steps as f64 * STEP_SECS);
     WorldResult {
         name: world.name.clone(),
         object: world.object.clone(),
@@ -143,12 +154,18 @@ fn summarise(world: &World, results: Vec<EpisodeResult>, first: Option<&WorldRes
         successes,
         interval: wilson(successes, results.len()),
         outcomes,
-        median_secs_to_success: times.get(times.len() / 2).map(|s| *s as f64 * STEP_SECS),
+        median_secs_to_success: median(secs.collect()),
         mean_moved: results.iter().map(|r| r.moved).sum::<f64>() / results.len() as f64,
+        end_gap_mm,
         against_first,
         results,
         strips: BTreeMap::new(),
     }
+}
+
+fn median(mut values: Vec<f64>) -> Option<f64> {
+    values.sort_by(f64::total_cmp);
+    values.get(values.len() / 2).copied()
 }
 
 /// A strip of pictures of the first episode of every kind of end, per world.
@@ -186,8 +203,8 @@ pub fn pictures(
 /// The table for people.
 pub fn table(results: &[WorldResult]) -> String {
     let mut out = format!(
-        "{:<22} {:>9} {:>8} {:>15} {:>7} {:>7} {:>24} {:>8}\n",
-        "world", "success", "rate %", "95 %", "s", "moved", "first - this [points]", "McNemar"
+        "{:<22} {:>9} {:>7} {:>14} {:>5} {:>6} {:>7} {:>24} {:>8}\n",
+        "world", "success", "rate %", "95 %", "s", "moved", "gap mm", "first - this [points]", "McNemar"
     );
     for r in results {
         let percent = |x: f64| 100.0 * x;
@@ -197,13 +214,14 @@ pub fn table(results: &[WorldResult]) -> String {
         });
         let [lo, hi] = r.interval.map(percent);
         out += &format!(
-            "{:<22} {:>9} {:>8.1} {:>15} {:>7} {:>7.2} {:>24} {:>8}\n",
+            "{:<22} {:>9} {:>7.1} {:>14} {:>5} {:>6.2} {:>7} {:>24} {:>8}\n",
             r.name,
             format!("{}/{}", r.successes, r.episodes),
             percent(r.successes as f64 / r.episodes as f64),
             format!("{lo:.1} .. {hi:.1}"),
             r.median_secs_to_success.map_or("-".into(), |s| format!("{s:.1}")),
             r.mean_moved,
+            r.end_gap_mm.map_or("-".into(), |g| format!("{g:.1}")),
             against[0],
             against[1]
         );
