@@ -60,7 +60,7 @@ fn a_urdf_becomes_an_object_that_the_arm_can_be_asked_about() {
     // The same command again replaces its own folder, and nothing else's.
     hingecast(d.path(), "import-object cupboard.urdf -o object").done();
     hingecast(d.path(), "import-object cupboard.urdf -o .").refused("something else", ".");
-    hingecast(d.path(), "import-object cupboard.urdf -o o --scale -1").refused("-1", "--scale");
+    hingecast(d.path(), "import-object cupboard.urdf -o o --scale 0").refused("0 is not", "--scale");
 }
 
 /// A drawer with a bar to pull, made of boxes.
@@ -90,7 +90,11 @@ fn bad_input_is_named() {
     hingecast(d.path(), "demos -n 2 -o x.hdf5 --object no_such").refused("no object", "objects");
     hingecast(d.path(), "demos -n 2 -o x.hdf5 --twin nowhere").refused("no model", "nowhere");
     hingecast(d.path(), "demos -n 2 -o x.hdf5 --joint door").refused("no joint 'door'", "covered_box");
-    hingecast(d.path(), "demos -n 2 -o x.hdf5 --object glasses").refused("gripper", "glasses");
+    let stone = r#"<mujoco><worldbody><body><geom size=".1"/></body></worldbody></mujoco>"#;
+    std::fs::write(d.path().join("stone.xml"), stone).unwrap();
+    hingecast(d.path(), "demos -n 2 -o x.hdf5 --object stone.xml").refused("nothing moves", "stone");
+    hingecast(d.path(), "demos -n 2 -o x.hdf5 --scale 0.05").refused("gripper", "covered_box");
+    hingecast(d.path(), "demos -n 2 -o x.hdf5 --scale nan").refused("not a size", "--scale");
     hingecast(d.path(), "demos --inspect nothing.hdf5").refused("cannot read", "nothing.hdf5");
     hingecast(d.path(), "rollout nowhere --object covered_box").refused("not a policy", "nowhere");
     hingecast(d.path(), "demos -n 4 -o few.hdf5").done();

@@ -182,8 +182,3 @@ fn screw_of(env: &Env) -> Screw {
     let slides = env.scene.target.joint.slides;
     Screw { kind: if slides { JointKind::Prismatic } else { JointKind::Revolute }, axis, pivot }
 }
-impl Expert {
-    pub fn phase_name(&self) -> String {
-        format!("{:?}", self.phase)
-    }
-}

@@ -26,6 +26,13 @@ pub struct Made {
 /// # Errors
 /// When the gripper fits nowhere, or the demonstrator never succeeds.
 pub fn make_task(path: &Path, kind: TaskKind, joint: Option<&str>, scale: Option<f64>) -> Result<Made, SimError> {
+    if let Some(s) = scale.filter(|s| !(s.is_finite() && *s > 0.0)) {
+        return Err(SimError::task(
+            format!("{s} is not a size"),
+            "--scale",
+            "simulated metres per unit of the model, for instance 0.5",
+        ));
+    }
     let path = object::model_file(path)?;
     let place = path.display().to_string();
     let sizes: Vec<Size> = match scale {
