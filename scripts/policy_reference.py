@@ -6,6 +6,7 @@
 
     scripts/policy_reference.py hdf5 OUT.hdf5          a file laid out as robomimic does: crates/policy/tests/data/robomimic.hdf5
     scripts/policy_reference.py sequences DEMOS.hdf5   reads a file of ours with robomimic's own SequenceDataset
+    scripts/policy_reference.py weights MODEL.pth OUT.safetensors     a robomimic checkpoint's weights for policy.safetensors
     scripts/policy_reference.py curve OUT.safetensors small|lift   200 steps of robomimic's actor and PyTorch's Adam: weights,
                                                        batches, first gradient, losses (crates/policy/tests/data/curve.safetensors)
     scripts/policy_reference.py speed BINARY [HIDDEN] [THREADS]   training steps of crates/policy/examples/step_speed.rs
@@ -20,7 +21,7 @@ import time
 
 
 def write_hdf5(path):
-    """Two demonstrations with a gap in their numbers, f64 actions, f32 states, integer dones, pictures."""
+    """Two demonstrations with a gap in their numbers, numbers of many types, compressed observations, pictures."""
     import h5py
     import numpy as np
 
@@ -33,10 +34,12 @@ def write_hdf5(path):
             demo.attrs["num_samples"] = 3
             actions = np.zeros((3, 7))
             actions[1] = [0.25, -0.5, 0, 0, 0, 0, 1]
-            demo.create_dataset("actions", data=actions)
+            # The second one as other writers of this layout have it: f32 actions, rewards and dones in a byte.
+            other = name == "demo_2"
+            demo.create_dataset("actions", data=actions.astype(np.float32) if other else actions)
             demo.create_dataset("states", data=np.array([[0.5, 0.1], [1.5, 0.1], [2.5, 0.1]], dtype=np.float32))
-            demo.create_dataset("rewards", data=np.array([0.0, 0.0, 1.0]))
-            demo.create_dataset("dones", data=np.array([0, 0, 1]))
+            demo.create_dataset("rewards", data=np.array([0, 0, 1], dtype=np.uint8 if other else np.float64))
+            demo.create_dataset("dones", data=np.array([0, 0, 1], dtype=bool if other else np.int64))
             demo.create_dataset("obs/object", data=np.array([[0, 0.5], [1, 1.5], [2, 2.5]]), compression="gzip")
             demo.create_dataset("obs/agentview_image", data=np.zeros((3, 4, 4, 3), dtype=np.uint8))
         f.create_dataset("mask/train", data=np.array(["demo_0"], dtype="S"))
@@ -80,6 +83,15 @@ def actor(inputs, hidden, min_std=1e-4):
                                          num_modes=5, min_std=min_std, encoder_kwargs=encoder)
     net.train()
     return net, lambda x, a: -net.forward_train({"object": x}).log_prob(a).mean()
+
+
+def weights(checkpoint, path):
+    """Every weight once, under its own name; those that PyTorch shares under two names are copied."""
+    import torch
+    from safetensors.torch import save_file
+
+    model = torch.load(checkpoint, map_location="cpu", weights_only=False)["model"]
+    save_file({k: v.clone().contiguous() for k, v in model.items()}, path)
 
 
 def curve(path, size="small"):
@@ -153,7 +165,7 @@ def speed(binary, hidden="400", threads="1"):
 
 
 if __name__ == "__main__":
-    verbs = {"speed": speed, "curve": curve, "hdf5": write_hdf5, "sequences": read_sequences}
+    verbs = {"speed": speed, "curve": curve, "weights": weights, "hdf5": write_hdf5, "sequences": read_sequences}
     if len(sys.argv) < 3 or sys.argv[1] not in verbs:
         sys.exit(__doc__)
     verbs[sys.argv[1]](*sys.argv[2:])

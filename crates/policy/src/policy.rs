@@ -60,7 +60,7 @@ impl PolicyConfig {
 
     /// Numbers of an observation.
     pub fn inputs(&self) -> usize {
-        self.obs.iter().map(|k| k.width).sum()
+        self.obs.iter().fold(0, |sum, k| sum.saturating_add(k.width))
     }
 }
 
@@ -219,7 +219,7 @@ pub(crate) fn parameters_from(
     prefix: &str,
     path: &Path,
 ) -> Result<Vec<f32>, PolicyError> {
-    let mut out = vec![0.0; net.parameters()];
+    let mut out = Vec::new();
     for tensor in &net.tensors {
         let name = format!("{prefix}{}", tensor.name);
         let refuse = |what: &str, value: String| {
@@ -232,11 +232,11 @@ pub(crate) fn parameters_from(
             return Err(refuse("a weight of another shape or type", found));
         }
         let values = view.data().chunks_exact(4).map(|b| f32::from_le_bytes(b.try_into().expect("four bytes")));
-        for (i, (to, value)) in out[tensor.range.clone()].iter_mut().zip(values).enumerate() {
+        for (i, value) in values.enumerate() {
             if !value.is_finite() {
                 return Err(refuse("a weight is not finite", format!("[{i}] = {value}")));
             }
-            *to = value;
+            out.push(value);
         }
     }
     Ok(out)

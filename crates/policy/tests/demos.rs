@@ -47,7 +47,8 @@ fn what_is_written_is_read_back() {
     assert_eq!(std::fs::read_dir(dir.path()).unwrap().count(), 1, "a temporary file was left");
 }
 
-/// A file made by h5py and laid out by robomimic 0.3 (f64 actions, f32 states, integer dones, a gap in the numbers, pictures):
+/// A file made by h5py and laid out by robomimic 0.3 (a gap in the numbers, f32, f64,
+/// bytes and booleans, compression, pictures):
 /// scripts/policy_reference.py writes it.
 #[test]
 fn robomimic_files_are_read() {
@@ -59,7 +60,8 @@ fn robomimic_files_are_read() {
     let e = &demos.episodes[1];
     assert_eq!(e.actions[1], [0.25, -0.5, 0.0, 0.0, 0.0, 0.0, 1.0]);
     assert_eq!(e.obs["object"][2], [2.0, 2.5]);
-    assert_eq!(e.dones, [false, false, true]);
+    assert_eq!((&e.dones[..], &e.rewards[..]), (&[false, false, true][..], &[0.0, 0.0, 1.0][..]));
+    assert_eq!(demos.episodes[0].dones, e.dones);
     assert_eq!(e.states[1], [1.5, 0.1f32 as f64]);
     assert!(!e.obs.contains_key("agentview_image"));
     assert!(e.next_obs.is_empty() && e.model_file.is_empty());

@@ -25,6 +25,9 @@ use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 use std::sync::{Arc, Mutex};
 
+/// The success rate, 0 to 1, of the policy in a folder. Asked again when the sweep runs again: keep results that cost time.
+pub type Score = dyn Fn(&Path) -> Result<f64> + Sync;
+
 /// A sweep's combinations may not fill a disk by mistake.
 const MOST: usize = 10_000;
 
@@ -198,7 +201,7 @@ pub fn run(
     out: &Path,
     threads: usize,
     progress: &Progress,
-    score: Option<&(dyn Fn(&Path) -> Result<f64> + Sync)>,
+    score: Option<&Score>,
 ) -> Result<Vec<Row>> {
     // All settings are resolved before the first training begins: a typing error must not wait an hour.
     let mut jobs = Vec::new();
@@ -267,12 +270,7 @@ struct Scores {
 }
 
 impl Job {
-    fn run(
-        &self,
-        demos: &Demos,
-        progress: &Progress,
-        score: Option<&(dyn Fn(&Path) -> Result<f64> + Sync)>,
-    ) -> Result<Scores> {
+    fn run(&self, demos: &Demos, progress: &Progress, score: Option<&Score>) -> Result<Scores> {
         let last = train(demos, &self.config, &self.folder, progress)?.last();
         let success = score.map(|score| score(&self.folder)).transpose()?;
         Ok(Scores { train_loss: last.train, valid_loss: last.valid, success })
@@ -437,7 +435,7 @@ mod tests {
             let policy = hingecast_policy::Policy::load(folder)?;
             Ok(if policy.net.config.rnn_hidden == 8 { 0.9 } else { 0.5 })
         };
-        let go = |score: Option<&(dyn Fn(&Path) -> Result<f64> + Sync)>, threads: usize| {
+        let go = |score: Option<&Score>, threads: usize| {
             run(&sweep, Preset::BcRnnFast, None, &set, &demos(), &out, threads, &Progress::default(), score).unwrap()
         };
         let rows = go(Some(&score), 3);

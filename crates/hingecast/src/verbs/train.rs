@@ -6,10 +6,8 @@ use hingecast::failure::{Failure, Result};
 use hingecast::training::{self, sweep};
 use hingecast_policy::Demos;
 use hingecast_policy::train::Preset;
+#[cfg(feature = "mujoco")]
 use std::path::Path;
-
-/// The success rate of the policy in a folder.
-type Score = dyn Fn(&Path) -> Result<f64> + Sync;
 
 pub fn run(session: &Session, args: &Train) -> Result<Outcome> {
     let preset: Preset =
@@ -73,7 +71,7 @@ fn run_sweep(
 
 /// Success rates beside the losses, where the demonstrations are of our own simulator.
 #[cfg(feature = "mujoco")]
-fn score(args: &Train, demos: &Demos) -> Result<Option<Box<Score>>> {
+fn score(args: &Train, demos: &Demos) -> Result<Option<Box<sweep::Score>>> {
     use hingecast::simulate::{record::world_of, rollout::success_rate};
     use hingecast_sim::{Scene, SceneConfig};
     let Ok(world) = world_of(demos, &args.demos) else { return Ok(None) };
@@ -87,6 +85,6 @@ fn score(args: &Train, demos: &Demos) -> Result<Option<Box<Score>>> {
 }
 
 #[cfg(not(feature = "mujoco"))]
-fn score(_: &Train, _: &Demos) -> Result<Option<Box<Score>>> {
+fn score(_: &Train, _: &Demos) -> Result<Option<Box<sweep::Score>>> {
     Ok(None)
 }

@@ -2,7 +2,7 @@
 
 use super::{Demos, Episode, check, index_of};
 use crate::{ACTION_SIZE, PolicyError};
-use rust_hdf5::{H5File, H5Group, Hdf5Error};
+use rust_hdf5::{DatatypeMessage, H5Dataset, H5File, H5Group, Hdf5Error};
 use std::collections::BTreeMap;
 use std::path::Path;
 
@@ -153,7 +153,7 @@ impl Reader {
         })
     }
 
-    /// A dataset of one or two axes as f64; `None` for pictures. Integers and f32 are widened.
+    /// A dataset of one or two axes as f64; `None` for pictures. Everything is widened to f64.
     fn table(&self, group: &H5Group, name: &str, place: &str) -> Result<Option<Table>, PolicyError> {
         let path = format!("{}/{name}", group.name().trim_start_matches('/'));
         let dataset = self.h5.dataset(&path).map_err(|e| self.damaged(place, e))?;
@@ -167,15 +167,21 @@ impl Reader {
             }
             _ => return Ok(None),
         };
-        let values = match dataset.read_numeric_as::<f64>() {
-            Ok(values) => values,
-            Err(Hdf5Error::TypeMismatch(_)) => {
-                let whole = dataset.read_numeric_as::<i64>().map_err(|e| self.damaged(place, e))?;
-                whole.into_iter().map(|v| v as f64).collect()
-            }
-            Err(e) => return Err(self.damaged(place, e)),
-        };
+        let values = self.numbers(&dataset).map_err(|e| self.damaged(place, e))?;
         Ok(Some(Table { rows, width, values }))
+    }
+
+    /// Floating, whole, or (h5py's booleans) an enumeration in a byte.
+    fn numbers(&self, dataset: &H5Dataset) -> Result<Vec<f64>, Hdf5Error> {
+        if matches!(dataset.datatype()?, DatatypeMessage::Enum { .. }) {
+            return Ok(dataset.read_raw::<i8>()?.into_iter().map(f64::from).collect());
+        }
+        match dataset.read_numeric_as::<f64>() {
+            Err(Hdf5Error::TypeMismatch(_)) => {
+                Ok(dataset.read_numeric_as::<i64>()?.into_iter().map(|v| v as f64).collect())
+            }
+            read => read,
+        }
     }
 
     /// Masks with the episodes' new names.

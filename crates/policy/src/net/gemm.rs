@@ -23,27 +23,32 @@ impl<'a> Matrix<'a> {
     }
 }
 
-/// c = keep c + a b. The order of each sum depends on the shapes alone. With `keep` 0 what was in `c` does not matter.
+/// c = keep c + a b, on the calling thread. The order of each sum depends on the shapes alone. With `keep` 0 what was in `c` does not matter.
 pub fn gemm(a: Matrix, b: Matrix, keep: f32, c: &mut [f32]) {
     let (m, k, n) = (a.rows, a.columns, b.columns);
     assert!(k == b.rows && c.len() == m * n);
     // Sound: the asserts above and in `Matrix::new` keep all three inside their slices; `c` is borrowed alone.
     unsafe {
-        matrixmultiply::sgemm(
+        gemm::gemm(
             m,
-            k,
             n,
-            1.0,
-            a.data.as_ptr(),
-            a.strides[0],
-            a.strides[1],
-            b.data.as_ptr(),
-            b.strides[0],
-            b.strides[1],
-            keep,
+            k,
             c.as_mut_ptr(),
-            n as isize,
             1,
+            n as isize,
+            keep != 0.0,
+            a.data.as_ptr(),
+            a.strides[1],
+            a.strides[0],
+            b.data.as_ptr(),
+            b.strides[1],
+            b.strides[0],
+            keep,
+            1.0,
+            false,
+            false,
+            false,
+            gemm::Parallelism::None,
         );
     }
 }
