@@ -11,7 +11,7 @@ use hingecast_policy::Policy;
 use hingecast_policy::demos::read;
 use hingecast_sim::trial::make_task;
 use hingecast_sim::{Scene, SceneConfig, Spoil, TaskKind, TaskSpec};
-use std::path::PathBuf;
+use std::path::Path;
 
 pub fn run(session: &Session, args: &Rollout) -> Result<Outcome> {
     let policy = Policy::load(&args.policy)?;
@@ -65,7 +65,7 @@ pub fn run(session: &Session, args: &Rollout) -> Result<Outcome> {
     Ok(Outcome::Done)
 }
 
-fn world(name: &str, object: &PathBuf, spoil: Vec<Spoil>, task: &TaskSpec) -> Result<World> {
-    let config = SceneConfig { object: object.clone(), spoil, visuals: false };
-    Ok(World { name: name.to_string(), object: object.clone(), scene: Scene::new(&config, task)? })
+fn world(name: &str, object: &Path, spoil: Vec<Spoil>, task: &TaskSpec) -> Result<World> {
+    let config = SceneConfig { object: object.to_path_buf(), spoil, visuals: false };
+    Ok(World { name: name.to_string(), object: object.to_path_buf(), scene: Scene::new(&config, task)? })
 }
