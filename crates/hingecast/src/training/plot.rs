@@ -52,17 +52,27 @@ fn chart(series: &[Series], x: &str, y: &str) -> String {
                 .x_label_area_size(32)
                 .y_label_area_size(60)
                 .build_cartesian_2d(x_range, y_range)?;
-            chart.configure_mesh().x_desc(x).y_desc(y).light_line_style(WHITE).draw()?;
+            // No trailing digits: 0.3, 200.
+            let label = |v: &f64| ((v * 1e6).round() / 1e6).to_string();
+            let mut mesh = chart.configure_mesh();
+            mesh.x_desc(x).y_desc(y).x_label_formatter(&label).light_line_style(WHITE).draw()?;
             for Series { name, color: [r, g, b], points, lines } in series {
                 let color = RGBColor(*r, *g, *b);
                 let drawn = if *lines {
+                    // A single validation has no line.
+                    if points.len() == 1 {
+                        chart.draw_series([Circle::new(points[0], 3, color.filled())])?;
+                    }
                     chart.draw_series(LineSeries::new(points.iter().copied(), color.stroke_width(2)))?
                 } else {
                     chart.draw_series(points.iter().map(|p| Circle::new(*p, 4, color.filled())))?
                 };
                 drawn.label(*name).legend(move |(x, y)| Circle::new((x + 8, y), 4, color.filled()));
             }
-            chart.configure_series_labels().background_style(WHITE.mix(0.8)).border_style(BLACK.mix(0.3)).draw()?;
+            // One series is named by its axis, and a legend may hide a point.
+            if series.len() > 1 {
+                chart.configure_series_labels().background_style(WHITE.mix(0.8)).border_style(BLACK.mix(0.3)).draw()?;
+            }
             area.present()?;
             Ok(())
         };

@@ -180,7 +180,7 @@ fn folder_name(settings: &BTreeMap<String, toml::Value>) -> String {
     let name: String = pairs
         .join(",")
         .chars()
-        .filter(|c| !c.is_whitespace())
+        .filter(|c| !c.is_whitespace() && *c != '"')
         .map(|c| if c.is_ascii_alphanumeric() || ".,=_-+".contains(c) { c } else { '_' })
         .collect();
     if name.len() <= 150 { name } else { format!("{}-{}", &name[..110], crate::stage::stamp(&[&name])) }
