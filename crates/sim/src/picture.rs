@@ -5,9 +5,10 @@
 use crate::env::Env;
 use glam::DVec3;
 
-/// Where the picture is taken from, and what its middle shows; world frame, metres.
-const EYE: DVec3 = DVec3::new(0.62, -0.78, 1.42);
-const MIDDLE: DVec3 = DVec3::new(-0.02, 0.02, 0.9);
+/// Where the picture is taken from, and what its middle shows; world frame, metres. From the side: the hand comes from one end,
+/// the object faces it.
+const EYE: DVec3 = DVec3::new(-0.1, -1.05, 1.4);
+const MIDDLE: DVec3 = DVec3::new(-0.03, 0.0, 0.95);
 /// Half the picture's height at distance 1.
 const HALF_HEIGHT: f64 = 0.36;
 const LAMP: DVec3 = DVec3::new(0.35, -0.5, 0.79);
