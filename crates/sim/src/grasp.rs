@@ -303,7 +303,7 @@ impl Search {
                 / (self.part[1] - self.part[0]).length().max(1e-9)
         };
         // The less the hand leans, the farther the wrist is from its stops.
-        let score = 1.2 * lever - 0.6 * approach.z + 0.4 * room - 3.0 * width
+        let score = 1.2 * lever - 2.0 * approach.z + 0.4 * room - 3.0 * width
             + 0.4 * towards_arm
             + if turn_wrist { 0.0 } else { 0.4 };
 

@@ -150,7 +150,10 @@ impl Target {
                 data.kinematics();
                 let in_part = |g: usize| hangs_on(data.model(), data.model().geom_bodyid()[g] as usize, part);
                 let Some([lo, hi]) = bounds(data, in_part) else { continue };
-                let distance = (0.5 * (lo + hi)).distance(task.part_centre);
+                // What is grasped must be there; the centre decides between parts and ends that both have something there. Not
+                // the centre alone: a twin whose drawer lost its inside to its neighbour has it elsewhere.
+                let spot = task.grasp.trans;
+                let distance = spot.distance(spot.clamp(lo, hi)) + 0.25 * (0.5 * (lo + hi)).distance(task.part_centre);
                 let body_from_grasp = body_pose(data, part).inverse() * task.grasp;
                 if best.as_ref().is_none_or(|(d, _)| distance < *d) {
                     best = Some((distance, Self { joint: joint.clone(), closed, open, body_from_grasp }));

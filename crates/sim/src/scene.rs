@@ -208,9 +208,14 @@ fn spoil(spec: &mut MjSpec, config: &SceneConfig, task: &TaskSpec) -> Result<(),
             Spoil::Limits(share) if target.closed <= target.open => hi = lo + share * (hi - lo),
             Spoil::Limits(share) => lo = hi - share * (hi - lo),
             Spoil::Pivot(mm) => {
-                line = line.spoiled(&Spoil::Pivot(mm / task.scale), unscaled.grasp.trans, unscaled.part_centre)
+                line = line.spoiled(
+                    &Spoil::Pivot(mm / task.scale),
+                    joint.slides,
+                    unscaled.grasp.trans,
+                    unscaled.part_centre,
+                )
             }
-            s => line = line.spoiled(&s, unscaled.grasp.trans, unscaled.part_centre),
+            s => line = line.spoiled(&s, joint.slides, unscaled.grasp.trans, unscaled.part_centre),
         }
     }
     let entry = spec.joint_mut(&joint.name).ok_or_else(|| {

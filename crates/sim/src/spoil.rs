@@ -1,7 +1,7 @@
 //! Wrong on purpose: an object whose target joint is off by a known amount, to see whether a policy notices.
 //!
 //! All in the base frame; r points from the axis to the grasp, a is the axis, t = a x r the direction of motion there.
-//! `axis`: a turned about r, so that the part's motion tilts sideways by that angle. `pivot`: the axis moved away from the
+//! `axis`: a turned about r (a slide: about the vertical), so that the part's motion goes sideways by that angle. `pivot`: the axis moved away from the
 //! grasp along -r. `limits`: the range cut from its open end. `edge`: the hinge on the other side of the moving part,
 //! turning the other way, as if seen in a mirror.
 
@@ -56,9 +56,11 @@ pub(crate) struct Line {
 
 impl Line {
     /// The line after `spoil`; limits are none of its business.
-    pub fn spoiled(self, spoil: &Spoil, grasp: DVec3, part_centre: DVec3) -> Self {
+    pub fn spoiled(self, spoil: &Spoil, slides: bool, grasp: DVec3, part_centre: DVec3) -> Self {
         let foot = |x: DVec3| self.pivot + self.axis * (x - self.pivot).dot(self.axis);
-        let r = (grasp - foot(grasp)).normalize_or(self.axis.any_orthonormal_vector());
+        // A slide has no pivot: it goes askew about the vertical, or gravity would open the drawer.
+        let r = if slides { DVec3::Z } else { grasp - foot(grasp) };
+        let r = r.reject_from_normalized(self.axis).normalize_or(self.axis.any_orthonormal_vector());
         match *spoil {
             // About the foot, so that the axis stays where it is next to the grasp.
             Spoil::Axis(degrees) => {
