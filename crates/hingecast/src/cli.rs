@@ -44,6 +44,8 @@ pub enum Verb {
     Synth(Synth),
     /// Convert a recording of another layout (nerfstudio, ArtGS, DTA, PARIS, ScrewSplat, Dynamic 3D Gaussians).
     Import(Import),
+    /// Convert an object (PartNet-Mobility, URDF) for the simulator: convex collision pieces, joints, limits, masses.
+    ImportObject(ImportObject),
     /// Say what is wrong with a recording and what to try; `--fix` repairs what is safe to repair.
     Check(Check),
     /// Build the twin of a recording. Run again to resume; finished stages are kept.
@@ -52,8 +54,12 @@ pub enum Verb {
     Eval(Eval),
     /// Write the report of a run again.
     Report(Report),
+    /// Record demonstrations of the robot arm opening an object or its twin; `--inspect` lists, plots and replays them.
+    Demos(Demos),
     /// Clone a policy from demonstrations (robomimic HDF5). Run again to resume; `--sweep` tries many settings.
     Train(Train),
+    /// Run a policy in seeded episodes on the true object, on its twin and on spoiled ones; compare in pairs.
+    Rollout(Rollout),
     /// Record, build and evaluate a suite of objects; print the table of errors and times.
     Bench(Bench),
     /// Say what this machine has and lacks.
@@ -122,6 +128,22 @@ pub struct Import {
     /// Layout of the source: auto, nerfstudio, artgs, dta, paris, screwsplat or dynamic3dgs.
     #[arg(long, default_value = "auto")]
     pub format: String,
+}
+
+#[derive(Args, Debug)]
+pub struct ImportObject {
+    /// Folder or file of the object (mobility.urdf), or the name of a sample or of one in $HINGECAST_DATA.
+    pub object: String,
+    /// Object folder to write: robot.xml (MJCF), robot.urdf, meshes.
+    #[arg(long, short)]
+    pub out: PathBuf,
+    /// All lengths times this. The simulator scales by itself what its arm cannot reach; leave it when twins of the same
+    /// recordings shall fit.
+    #[arg(long, default_value_t = 1.0, value_name = "FACTOR")]
+    pub scale: f64,
+    /// Density of all parts, kg/m^3.
+    #[arg(long, default_value_t = 600.0, value_name = "DENSITY")]
+    pub density: f64,
 }
 
 #[derive(Args, Debug)]
@@ -223,6 +245,9 @@ pub struct Train {
     /// there are threads; table and plot at the end. docs/policy.md shows such a file.
     #[arg(long, value_name = "FILE")]
     pub sweep: Option<PathBuf>,
+    /// Episodes that every policy of a sweep is rolled out in, where the demonstrations' world is at hand; 0 = none.
+    #[arg(long, default_value_t = 50, value_name = "N")]
+    pub rollouts: usize,
 }
 
 #[derive(Args, Debug)]
@@ -257,6 +282,69 @@ pub struct Bench {
     /// Delete each recording once it is evaluated (56 MB per object at the defaults).
     #[arg(long)]
     pub tidy: bool,
+}
+
+#[derive(Args, Debug)]
+pub struct Demos {
+    /// open: through half of the joint's range; close; hinged-box: the seed's two blocks, which lifting solves too.
+    #[arg(long, default_value = "open", value_parser = ["open", "close", "hinged-box"])]
+    pub task: String,
+    /// Folder or file of the object, or the name of a sample [default: covered_box; hinged_blocks for hinged-box].
+    #[arg(long, value_name = "OBJECT")]
+    pub object: Option<String>,
+    /// Record on the twin of this run instead [default: on the object].
+    #[arg(long, value_name = "RUN", conflicts_with = "object")]
+    pub twin: Option<PathBuf>,
+    /// Which joint moves, by its name in the model [default: the one that is easiest to grasp].
+    #[arg(long, value_name = "NAME")]
+    pub joint: Option<String>,
+    /// Simulated metres per unit of the model file [default: at most 1, so that the arm reaches all of the joint's way].
+    #[arg(long, value_name = "FACTOR")]
+    pub scale: Option<f64>,
+    /// Who demonstrates.
+    #[arg(long, default_value = "scripted", value_parser = ["scripted"])]
+    pub expert: String,
+    /// Successful episodes to record.
+    #[arg(short, default_value_t = 300, value_name = "N", value_parser = at_least_one)]
+    pub n: usize,
+    /// File to write, robomimic's HDF5; needed unless --inspect is given [default: none].
+    #[arg(long, short, value_name = "FILE")]
+    pub out: Option<PathBuf>,
+    /// Seed of places, starts and imperfections.
+    #[arg(long, default_value_t = 0, value_name = "N")]
+    pub seed: u64,
+    /// List and plot this file and replay it; exit 1 unless every state comes out with the same bits [default: none].
+    #[arg(long, value_name = "FILE")]
+    pub inspect: Option<PathBuf>,
+}
+
+#[derive(Args, Debug)]
+pub struct Rollout {
+    /// Folder of the policy, the -o of `hingecast train`.
+    pub policy: PathBuf,
+    /// The true object: folder, file or name of a sample [default: what the demonstrations were recorded on].
+    #[arg(long, value_name = "OBJECT")]
+    pub object: Option<String>,
+    /// Run whose twin takes the object's place; both given: same seeds, compared in pairs [default: none].
+    #[arg(long, value_name = "RUN")]
+    pub twin: Option<PathBuf>,
+    /// Also on the object spoiled on purpose: axis=DEGREES, pivot=MM, limits=SHARE, edge (the hinge on the opposite edge);
+    /// joined by commas for several at once; may be repeated, each is a world of its own [default: none].
+    #[arg(long, value_name = "HOW")]
+    pub spoil: Vec<String>,
+    /// Demonstrations whose task (place, grasp, size) holds here [default: those that the policy was trained on; without
+    /// a note of them the task is made from the object].
+    #[arg(long, value_name = "FILE")]
+    pub demos: Option<PathBuf>,
+    /// Episodes in every world.
+    #[arg(short, default_value_t = 200, value_name = "N", value_parser = at_least_one)]
+    pub n: usize,
+    /// Seed of the episodes.
+    #[arg(long, default_value_t = 0, value_name = "N")]
+    pub seed: u64,
+    /// Folder for rollout.json and a strip of pictures of each kind of end [default: none, only the answer].
+    #[arg(long, short, value_name = "FOLDER")]
+    pub out: Option<PathBuf>,
 }
 
 #[cfg(test)]

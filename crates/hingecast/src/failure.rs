@@ -91,3 +91,18 @@ impl From<hingecast_geom::ply::PlyError> for Failure {
         Self::new(e.to_string(), "a PLY file", "build again with --fresh if it is one of the run's own files")
     }
 }
+
+#[cfg(feature = "mujoco")]
+impl From<hingecast_sim::SimError> for Failure {
+    fn from(e: hingecast_sim::SimError) -> Self {
+        use hingecast_sim::SimError as S;
+        match e {
+            S::Load { path, what } => Self::new(
+                format!("MuJoCo cannot load the model: {what}"),
+                path,
+                "look at the file in a viewer of MuJoCo's",
+            ),
+            S::Task { what, place, hint } => Self::new(what, place, hint),
+        }
+    }
+}

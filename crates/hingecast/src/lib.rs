@@ -3,9 +3,12 @@
 pub mod config;
 pub mod eval;
 pub mod failure;
+pub mod import_object;
 pub mod pipeline;
 pub mod report;
 pub mod run;
+#[cfg(feature = "mujoco")]
+pub mod simulate;
 pub mod stage;
 pub mod training;
 pub mod ui;

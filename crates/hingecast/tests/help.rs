@@ -4,7 +4,21 @@ mod common;
 
 use common::hingecast;
 
-const VERBS: [&str; 10] = ["demo", "synth", "import", "check", "build", "eval", "report", "train", "bench", "doctor"];
+const VERBS: [&str; 13] = [
+    "demo",
+    "synth",
+    "import",
+    "import-object",
+    "check",
+    "build",
+    "eval",
+    "report",
+    "demos",
+    "train",
+    "rollout",
+    "bench",
+    "doctor",
+];
 
 /// Flags that take a value say what holds without it; those with a unit say the unit.
 #[test]

@@ -1,15 +1,27 @@
-//! MuJoCo, the simulator of this field: loads what `twin` wrote and tries it before a user does.
+//! MuJoCo, the simulator of this field: tries what `twin` wrote before a user does, and lets an arm act on it.
+//!
+//! `check` loads a model, sweeps its joints and says what is wrong. The rest is a world with an arm: `object` and `scene` load an
+//! object or its twin onto a table, `grasp` finds where it can be held, `task` says what shall be done, `env` steps, observes and
+//! judges, `control` is the arm's control law, `expert` demonstrates, `spoil` makes wrong objects on purpose.
 
 pub mod check;
+pub mod control;
+pub mod env;
+mod error;
+pub mod expert;
+pub mod grasp;
 mod log;
+pub mod object;
+pub mod picture;
+pub mod scene;
+pub mod spoil;
+pub mod task;
+pub mod trial;
 
 pub use check::{CheckConfig, FileCheck, JointSweep, check_file, check_twin};
-
-/// Why a model could not be tried at all. What a working model does wrong is a doubt, not an error.
-#[derive(Debug, thiserror::Error)]
-pub enum SimError {
-    #[error(
-        "MuJoCo cannot load the model: {what}\n  where: {path}\n  try: open it with `python -m mujoco.viewer --mjcf={path}`, or build the twin again"
-    )]
-    Load { path: String, what: String },
-}
+pub use env::{Env, Outcome, Start};
+pub use error::SimError;
+pub use expert::Expert;
+pub use scene::{Scene, SceneConfig};
+pub use spoil::Spoil;
+pub use task::{TaskKind, TaskSpec};

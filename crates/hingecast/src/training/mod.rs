@@ -41,7 +41,7 @@ pub fn may_become_policy(folder: &Path) -> Result<()> {
     Err(Failure::new("the policy folder holds something else", folder.display().to_string(), hint))
 }
 
-/// Trains into `folder`, or goes on there: `train.toml`, the policy, `loss.svg`.
+/// Trains into `folder`, or goes on there: `train.toml`, `env_args.json`, the policy, `loss.svg`.
 ///
 /// # Errors
 /// Those of [`hingecast_policy::train::train`].
@@ -52,6 +52,8 @@ pub fn train(demos: &Demos, config: &TrainConfig, folder: &Path, progress: &Prog
         write_whole(&path, text.as_bytes()).map_err(Failure::io(&path))
     };
     write("train.toml", &toml::to_string_pretty(config).expect("a config is a table"))?;
+    // The world of the demonstrations: rollouts put the policy back into it.
+    write("env_args.json", &(serde_json::to_string_pretty(&demos.env_args).expect("plain data") + "\n"))?;
     let report = hingecast_policy::train::train(demos, config, folder, progress)?;
     write("loss.svg", &plot::losses(&report.history))?;
     Ok(report)

@@ -4,10 +4,15 @@ mod bench;
 mod build;
 mod check;
 mod demo;
+#[cfg(feature = "mujoco")]
+mod demos;
 mod doctor;
 mod eval;
 mod grid;
 mod import;
+mod import_object;
+#[cfg(feature = "mujoco")]
+mod rollout;
 mod synth;
 mod table;
 mod train;
@@ -48,6 +53,7 @@ pub fn run(cli: &Cli) -> Result<Outcome> {
         Verb::Demo(args) => demo::run(&session, args),
         Verb::Synth(args) => synth::run(&session, args),
         Verb::Import(args) => import::run(&session, args),
+        Verb::ImportObject(args) => import_object::run(&session, args),
         Verb::Check(args) => check::run(&session, args),
         Verb::Build(args) => build::run(&session, args),
         Verb::Eval(args) => eval::run(&session, args),
@@ -58,7 +64,25 @@ pub fn run(cli: &Cli) -> Result<Outcome> {
             session.answer(&serde_json::json!({ "report": path }));
             Ok(Outcome::Done)
         }
+        #[cfg(feature = "mujoco")]
+        Verb::Demos(args) => demos::run(&session, args),
+        #[cfg(not(feature = "mujoco"))]
+        Verb::Demos(_) => Err(without_mujoco("demos")),
+        #[cfg(feature = "mujoco")]
+        Verb::Rollout(args) => rollout::run(&session, args),
+        #[cfg(not(feature = "mujoco"))]
+        Verb::Rollout(_) => Err(without_mujoco("rollout")),
         Verb::Train(args) => train::run(&session, args),
         Verb::Doctor => doctor::run(&session),
     }
+}
+
+#[cfg(not(feature = "mujoco"))]
+fn without_mujoco(verb: &str) -> hingecast::failure::Failure {
+    let hint = "scripts/fetch_mujoco.sh, then build with default features";
+    hingecast::failure::Failure::new(
+        "this hingecast was built without the simulator",
+        format!("hingecast {verb}"),
+        hint,
+    )
 }

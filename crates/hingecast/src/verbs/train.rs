@@ -6,6 +6,8 @@ use hingecast::failure::{Failure, Result};
 use hingecast::training::{self, sweep};
 use hingecast_policy::Demos;
 use hingecast_policy::train::Preset;
+#[cfg(feature = "mujoco")]
+use std::path::Path;
 
 pub fn run(session: &Session, args: &Train) -> Result<Outcome> {
     let preset: Preset =
@@ -53,7 +55,8 @@ fn run_sweep(
 ) -> Result<Outcome> {
     let progress = session.ui.stage("sweep");
     let (file, threads) = (args.config.as_deref(), session.threads);
-    let rows = sweep::run(sweep, preset, file, set, demos, &args.out, threads, &progress, None)?;
+    let score = score(args, demos)?;
+    let rows = sweep::run(sweep, preset, file, set, demos, &args.out, threads, &progress, score.as_deref())?;
     drop(progress);
     session.ui.say(&sweep::table(&rows));
     session.ui.say(&format!("table and plots: {}", args.out.display()));
@@ -64,4 +67,24 @@ fn run_sweep(
         return Err(Failure::new("no training of the sweep succeeded", why, hint));
     }
     Ok(Outcome::Done)
+}
+
+/// Success rates beside the losses, where the demonstrations are of our own simulator.
+#[cfg(feature = "mujoco")]
+fn score(args: &Train, demos: &Demos) -> Result<Option<Box<sweep::Score>>> {
+    use hingecast::simulate::{record::world_of, rollout::success_rate};
+    use hingecast_sim::{Scene, SceneConfig};
+    let Ok(world) = world_of(demos, &args.demos) else { return Ok(None) };
+    if args.rollouts == 0 {
+        return Ok(None);
+    }
+    let config = SceneConfig { object: world.object, spoil: Vec::new(), visuals: false };
+    let scene = Scene::new(&config, &world.task)?;
+    let n = args.rollouts;
+    Ok(Some(Box::new(move |folder: &Path| success_rate(folder, &scene, n))))
+}
+
+#[cfg(not(feature = "mujoco"))]
+fn score(_: &Train, _: &Demos) -> Result<Option<Box<sweep::Score>>> {
+    Ok(None)
 }

@@ -1,0 +1,267 @@
+//! A PartNet-Mobility (or other) URDF -> a folder that a simulator runs: MJCF and URDF with convex collision pieces, joints, limits,
+//! masses. Says what it changed.
+//!
+//! Lengths, axes and the zero of every joint stay those that `synth` records, so a twin of the object and the object itself have
+//! one base frame. Surfaces of such objects are open sheets in many shells: each shell that is small against its part (a handle,
+//! a knob) is decomposed by itself, where the voxels of the whole part would swallow it.
+
+use crate::failure::{Failure, Result};
+use glam::{DVec3, Vec3};
+use hingecast_capture::object::{ArticulatedObject, PartGeometry};
+use hingecast_capture::synth::useful_ranges;
+use hingecast_geom::{Progress, TriMesh};
+use hingecast_twin::hulls::{HullConfig, decompose};
+use hingecast_twin::{PartModel, Twin, mass};
+use rayon::prelude::*;
+use serde::Serialize;
+use std::collections::HashMap;
+use std::path::Path;
+use std::sync::atomic::{AtomicUsize, Ordering};
+
+/// A shell below this share of its part's diagonal is a detail with pieces of its own.
+const DETAIL: f32 = 0.35;
+/// Shells smaller than this share of the object's diagonal (screws, letters) collide with nothing that matters.
+const CRUMB: f64 = 0.01;
+/// The most details of a part that get pieces of their own, largest first.
+const MOST_DETAILS: usize = 24;
+
+#[derive(Clone, Copy, Debug, Serialize)]
+pub struct ImportConfig {
+    /// Units of the new files per unit of the old one.
+    pub scale: f64,
+    /// kg/m^3 in the new units.
+    pub density: f64,
+}
+
+#[derive(Clone, Debug, Serialize)]
+pub struct Imported {
+    pub parts: usize,
+    pub joints: Vec<String>,
+    pub hulls: usize,
+    pub mass: f64,
+    pub diagonal: f64,
+    /// What is not as in the source, as sentences.
+    pub changes: Vec<String>,
+}
+
+/// Converts `source` into the folder `out`.
+///
+/// # Errors
+/// When the source cannot be read, or `out` holds something else.
+pub fn import(source: &Path, out: &Path, config: &ImportConfig, progress: &Progress) -> Result<Imported> {
+    let holds_other = out.is_dir()
+        && !out.join("twin.json").is_file()
+        && std::fs::read_dir(out).map_err(Failure::io(out))?.next().is_some();
+    if holds_other {
+        return Err(Failure::new(
+            "the output folder holds something else",
+            out.display().to_string(),
+            "give a new folder",
+        ));
+    }
+    let mut object = ArticulatedObject::load(source)?;
+    let mut changes = Vec::new();
+    // The ranges that `synth` plays: files let doors swing through their cabinets.
+    let useful = useful_ranges(&object);
+    for (joint, range) in object.tree.joints.iter_mut().zip(&useful) {
+        let limits = [range.lower.min(range.upper), range.lower.max(range.upper)];
+        if limits.iter().zip(joint.limits).any(|(a, b)| (a - b).abs() > 1e-6) {
+            let [from, to] = joint.limits;
+            changes.push(format!(
+                "joint '{}' may go {:.3} .. {:.3}, not {from:.3} .. {to:.3}",
+                joint.name, limits[0], limits[1]
+            ));
+            joint.limits = limits;
+        }
+    }
+    rescale(&mut object, config.scale);
+    if config.scale != 1.0 {
+        changes.push(format!("all lengths times {}", config.scale));
+    }
+    let merged: Vec<String> = object
+        .tree
+        .parts
+        .iter()
+        .zip(&object.parts)
+        .filter(|(_, p)| p.links.len() > 1)
+        .map(|(name, p)| format!("{name} ({} links)", p.links.len()))
+        .collect();
+    if !merged.is_empty() {
+        changes.push(format!("links joined by fixed or minor joints became one part: {}", merged.join(", ")));
+    }
+    if object.textures.iter().len() > 0 {
+        changes.push("textures became one colour a part; shapes keep their materials' colours".into());
+    }
+    changes.push(format!("masses and inertias come from {} kg/m^3: the source's are not read", config.density));
+    changes.push(
+        "the part and its parent do not collide with each other: convex pieces of both overlap at the joint".into(),
+    );
+
+    let diagonal = object.diagonal();
+    let (done, total) = (AtomicUsize::new(0), object.parts.len());
+    let parts: Vec<(PartModel, Option<String>)> = object
+        .parts
+        .par_iter()
+        .zip(&object.tree.parts)
+        .map(|(geometry, name)| {
+            let mesh = coloured(&object, geometry);
+            let hulls = collision(&mesh, diagonal);
+            progress.report(done.fetch_add(1, Ordering::Relaxed) + 1, total, name)?;
+            // The shells of such a part enclose no one volume; its convex pieces do.
+            let (inertial, doubt) = mass::inertial(&TriMesh::default(), &hulls, config.density);
+            let doubt = doubt
+                .filter(|d| d.contains("guessed"))
+                .map(|_| format!("part '{name}': mass guessed, it has no collision piece"));
+            Ok((PartModel { name: name.clone(), mesh, hulls, inertial }, doubt))
+        })
+        .collect::<Result<_>>()?;
+    let (parts, doubts): (Vec<PartModel>, Vec<Option<String>>) = parts.into_iter().unzip();
+    changes.extend(doubts.into_iter().flatten());
+    for part in parts.iter().filter(|p| p.mesh.is_empty()) {
+        changes.push(format!("part '{}' has no surface", part.name));
+    }
+    let hulls = parts.iter().map(|p| p.hulls.len()).sum();
+    changes.push(format!("surfaces became {hulls} convex collision pieces"));
+
+    let twin = Twin {
+        name: object.name.clone(),
+        tree: object.tree.clone(),
+        parts,
+        doubts: changes.clone(),
+        diagonal,
+        metric: object.metric,
+        up: DVec3::Z,
+    };
+    hingecast_twin::write(&twin, None, out)?;
+    Ok(Imported {
+        parts: twin.parts.len(),
+        joints: twin
+            .tree
+            .joints
+            .iter()
+            .map(|j| {
+                format!("{} ({:?}, {:.3} .. {:.3})", j.name, j.screw.kind, j.limits[0], j.limits[1]).to_lowercase()
+            })
+            .collect(),
+        hulls,
+        mass: twin.parts.iter().map(|p| p.inertial.mass).sum(),
+        diagonal,
+        changes,
+    })
+}
+
+fn rescale(object: &mut ArticulatedObject, scale: f64) {
+    for part in &mut object.parts {
+        part.vertices.iter_mut().for_each(|v| *v *= scale as f32);
+    }
+    for joint in &mut object.tree.joints {
+        joint.screw.pivot *= scale;
+        if !joint.screw.kind.turns() {
+            joint.limits = joint.limits.map(|l| l * scale);
+        }
+    }
+}
+
+/// The part's surface with its materials' colours at the vertices.
+fn coloured(object: &ArticulatedObject, geometry: &PartGeometry) -> TriMesh {
+    let mut colors = vec![[180u8; 3]; geometry.vertices.len()];
+    for (face, material) in geometry.faces.iter().zip(&geometry.materials) {
+        if let Some(m) = object.materials.get(*material as usize) {
+            let color = m.color.map(|c| (255.0 * c.clamp(0.0, 1.0)).round() as u8);
+            face.iter().for_each(|&v| colors[v as usize] = color);
+        }
+    }
+    TriMesh { vertices: geometry.vertices.clone(), faces: geometry.faces.clone(), colors }
+}
+
+/// Convex pieces: details each by itself, the rest together.
+fn collision(mesh: &TriMesh, diagonal: f64) -> Vec<TriMesh> {
+    let Some((lo, hi)) = mesh.bounds() else { return Vec::new() };
+    let part = (hi - lo).length();
+    let size = |shell: &TriMesh| shell.bounds().map_or(0.0, |(lo, hi)| (hi - lo).length());
+    let (mut details, rest): (Vec<TriMesh>, Vec<TriMesh>) = shells(mesh)
+        .into_iter()
+        .filter(|s| f64::from(size(s)) > CRUMB * diagonal)
+        .partition(|s| size(s) < DETAIL * part);
+    details.sort_by(|a, b| size(b).total_cmp(&size(a)));
+    let mut body = TriMesh::default();
+    let spare = details.split_off(details.len().min(MOST_DETAILS));
+    // Where everything is small against the whole (a chair of sticks), nothing is a detail.
+    let all_small = rest.is_empty();
+    for shell in rest.iter().chain(&spare).chain(details.iter().filter(|_| all_small)) {
+        body.append(shell);
+    }
+    let (mut hulls, _) = decompose(&body, &HullConfig::default());
+    if !all_small {
+        let fine = HullConfig { resolution: 64, concavity: 0.005, max_hulls: 8 };
+        hulls.extend(details.iter().flat_map(|d| decompose(d, &fine).0));
+    }
+    hulls
+}
+
+/// Connected pieces of the surface; vertices at the same place are one.
+fn shells(mesh: &TriMesh) -> Vec<TriMesh> {
+    let mut at: HashMap<[u32; 3], u32> = HashMap::new();
+    let same: Vec<u32> = mesh
+        .vertices
+        .iter()
+        .enumerate()
+        .map(|(i, v)| *at.entry((*v + Vec3::ZERO).to_array().map(f32::to_bits)).or_insert(i as u32))
+        .collect();
+    let mut root: Vec<u32> = (0..mesh.vertices.len() as u32).collect();
+    fn find(root: &mut [u32], mut i: u32) -> u32 {
+        while root[i as usize] != i {
+            root[i as usize] = root[root[i as usize] as usize];
+            i = root[i as usize];
+        }
+        i
+    }
+    for face in &mesh.faces {
+        let [a, b, c] = face.map(|i| same[i as usize]);
+        for (x, y) in [(a, b), (b, c)] {
+            let (x, y) = (find(&mut root, x), find(&mut root, y));
+            root[x.max(y) as usize] = x.min(y);
+        }
+    }
+    // By the smallest vertex of each shell: the order does not depend on the hash.
+    let mut faces: std::collections::BTreeMap<u32, Vec<[u32; 3]>> = std::collections::BTreeMap::new();
+    for face in &mesh.faces {
+        let shell = find(&mut root, same[face[0] as usize]);
+        faces.entry(shell).or_default().push(face.map(|i| same[i as usize]));
+    }
+    faces
+        .into_values()
+        .map(|faces| {
+            let mut index: HashMap<u32, u32> = HashMap::new();
+            let mut vertices = Vec::new();
+            let faces = faces
+                .into_iter()
+                .map(|f| {
+                    f.map(|i| {
+                        *index.entry(i).or_insert_with(|| {
+                            vertices.push(mesh.vertices[i as usize]);
+                            vertices.len() as u32 - 1
+                        })
+                    })
+                })
+                .collect();
+            TriMesh { vertices, faces, colors: Vec::new() }
+        })
+        .collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_knob_on_a_door_gets_a_piece_of_its_own() {
+        let mut door = TriMesh::cuboid(Vec3::ZERO, Vec3::new(1.0, 0.02, 1.5));
+        door.append(&TriMesh::cuboid(Vec3::new(0.9, 0.05, 0.7), Vec3::new(0.94, 0.09, 0.74)));
+        assert_eq!(shells(&door).len(), 2);
+        let hulls = collision(&door, 1.8);
+        let knob = hulls.iter().filter_map(TriMesh::bounds).find(|(lo, _)| lo.y > 0.04);
+        let (lo, hi) = knob.expect("a piece in front of the door");
+        assert!((hi - lo).length() < 0.08, "{lo} {hi}");
+    }
+}

@@ -1,0 +1,143 @@
+//! Demonstrations by the scripted expert: episodes in parallel, successes kept, the same file for any number of threads.
+//!
+//! Attempt k has the seed `seed * 2^20 + k`. Attempts are made in blocks of a fixed size and looked at in order; the first `n`
+//! successes are kept. So which thread made an attempt cannot matter.
+
+use crate::failure::{Failure, Result};
+use hingecast_geom::Progress;
+use hingecast_policy::{Demos, Episode};
+use hingecast_sim::trial::demonstrate;
+use hingecast_sim::{Env, Outcome, Scene, TaskSpec};
+use rayon::prelude::*;
+use serde::{Deserialize, Serialize};
+use std::collections::BTreeMap;
+use std::path::PathBuf;
+
+/// Attempts between two looks at how many succeeded.
+const BLOCK: usize = 32;
+/// One demonstration of ten is for validation.
+const VALID_EVERY: usize = 10;
+
+/// `env_kwargs` of the file: what replays and rollouts need to make the world again.
+#[derive(Clone, Debug, Serialize, Deserialize)]
+pub struct WorldArgs {
+    /// Model file of the object or twin that was opened.
+    pub object: PathBuf,
+    pub task: TaskSpec,
+    pub control_freq: usize,
+    pub seed: u64,
+}
+
+#[derive(Clone, Debug, Serialize)]
+pub struct Recorded {
+    pub kept: usize,
+    /// How the attempts that were thrown away ended.
+    pub thrown_away: BTreeMap<Outcome, usize>,
+    pub steps: usize,
+}
+
+/// Records `n` successful episodes of `scene`.
+///
+/// # Errors
+/// When the demonstrator succeeds in less than one of four attempts, or the person stops it.
+pub fn record(scene: &Scene, args: &WorldArgs, n: usize, progress: &Progress) -> Result<(Demos, Recorded)> {
+    let mut episodes: Vec<Episode> = Vec::new();
+    let mut thrown_away: BTreeMap<Outcome, usize> = BTreeMap::new();
+    let mut attempts = 0;
+    while episodes.len() < n {
+        if attempts > 4 * n + 4 * BLOCK {
+            let ends: Vec<String> = thrown_away.iter().map(|(o, k)| format!("{k} {}", outcome_name(*o))).collect();
+            return Err(Failure::new(
+                format!("the demonstrator succeeded in only {} of {attempts} attempts", episodes.len()),
+                format!("{}: {}", args.object.display(), ends.join(", ")),
+                "--joint for another joint, or --scale for another size",
+            ));
+        }
+        let block: Vec<Result<(Outcome, Episode)>> = (attempts..attempts + BLOCK)
+            .into_par_iter()
+            .map_init(|| Env::new(scene), |env, k| attempt(env, (args.seed << 20) + k as u64, progress))
+            .collect();
+        for made in block {
+            let (outcome, episode) = made?;
+            attempts += 1;
+            if outcome != Outcome::Success {
+                *thrown_away.entry(outcome).or_default() += 1;
+            } else {
+                episodes.push(episode);
+            }
+            if episodes.len() == n {
+                break;
+            }
+        }
+        let note = format!("{} thrown away", thrown_away.values().sum::<usize>());
+        progress.report(episodes.len(), n, &note)?;
+    }
+    let steps = episodes.iter().map(|e| e.actions.len()).sum();
+    let names = |valid: bool| -> Vec<String> {
+        (0..n).filter(|i| (i % VALID_EVERY == VALID_EVERY - 1) == valid).map(|i| format!("demo_{i}")).collect()
+    };
+    let mut masks = BTreeMap::from([("train".to_string(), names(false))]);
+    if n >= VALID_EVERY {
+        masks.insert("valid".to_string(), names(true));
+    }
+    let env_args = serde_json::json!({
+        "env_name": format!("hingecast-{}", args.task.kind.name()),
+        // robomimic's number for environments of the gym kind.
+        "type": 2,
+        "env_kwargs": args,
+    });
+    Ok((Demos { env_args, episodes, masks }, Recorded { kept: n, thrown_away, steps }))
+}
+
+fn attempt(env: &mut Env, seed: u64, progress: &Progress) -> Result<(Outcome, Episode)> {
+    progress.check()?;
+    env.reset(seed);
+    let mut episode = Episode { model_file: env.scene.xml_at(&env.start().place), ..Episode::default() };
+    let mut seen: Vec<BTreeMap<String, Vec<f64>>> = Vec::new();
+    let outcome = demonstrate(env, seed, |env, action| {
+        seen.push(env.observe());
+        episode.states.push(env.state());
+        episode.actions.push(*action);
+    })?;
+    seen.push(env.observe());
+    let steps = episode.actions.len();
+    for (t, observation) in seen.into_iter().enumerate() {
+        for (key, row) in observation {
+            if t < steps {
+                episode.obs.entry(key.clone()).or_default().push(row.clone());
+            }
+            if t > 0 {
+                episode.next_obs.entry(key).or_default().push(row);
+            }
+        }
+    }
+    let last = |t: usize| t + 1 == steps && outcome == Outcome::Success;
+    episode.rewards = (0..steps).map(|t| f64::from(u8::from(last(t)))).collect();
+    episode.dones = (0..steps).map(last).collect();
+    Ok((outcome, episode))
+}
+
+/// As the JSON says it, with spaces.
+pub fn outcome_name(outcome: Outcome) -> &'static str {
+    match outcome {
+        Outcome::Success => "success",
+        Outcome::NeverReached => "never reached",
+        Outcome::LostGrasp => "lost grasp",
+        Outcome::MovedTooLittle => "moved too little",
+        Outcome::KnockedAway => "knocked away",
+    }
+}
+
+/// The world that demonstrations were recorded in.
+///
+/// # Errors
+/// When they are not ours.
+pub fn world_of(demos: &Demos, file: &std::path::Path) -> Result<WorldArgs> {
+    serde_json::from_value(demos.env_args["env_kwargs"].clone()).map_err(|e| {
+        Failure::new(
+            format!("these demonstrations were recorded in another simulator's world: {e}"),
+            format!("{}, data, attribute env_args", file.display()),
+            "list and train on them all the same; only replay needs the world",
+        )
+    })
+}

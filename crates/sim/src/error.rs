@@ -1,0 +1,23 @@
+//! Why a simulation cannot start, in three lines each. What a working model does wrong is a doubt or a failed episode.
+
+/// What / where / what to try.
+#[derive(Debug, Clone, thiserror::Error)]
+pub enum SimError {
+    #[error(
+        "MuJoCo cannot load the model: {what}\n  where: {path}\n  try: open it with `python -m mujoco.viewer --mjcf={path}`, or build the twin again"
+    )]
+    Load { path: String, what: String },
+    #[error("{what}\n  where: {place}\n  try: {hint}")]
+    Task { what: String, place: String, hint: String },
+}
+
+impl SimError {
+    pub(crate) fn load(path: &std::path::Path, e: impl std::fmt::Display) -> Self {
+        let what = e.to_string().lines().collect::<Vec<_>>().join("; ");
+        Self::Load { path: path.display().to_string(), what }
+    }
+
+    pub(crate) fn task(what: impl Into<String>, place: impl Into<String>, hint: impl Into<String>) -> Self {
+        Self::Task { what: what.into(), place: place.into(), hint: hint.into() }
+    }
+}

@@ -1,0 +1,416 @@
+//! Where on the moving part a parallel gripper can close, found from collision geometry alone.
+//!
+//! For every way to come (from above, or leaning from four sides) and every direction to close in, rays ask a grid over the
+//! part: what is met first, and how thick is it a little deeper? Where both fingers would meet the moving part, the open hand
+//! is put there, on the way there, and along the joint's way, and MuJoCo says whether it collides.
+//!
+//! A hinge turns its part, and a hand that does not turn with it needs a place that may turn between the fingers: one where the
+//! closing direction lies along the axis. Elsewhere the wrist turns with the part.
+
+use crate::SimError;
+use crate::object::{self, ObjectJoint, body_pose, bounds, hangs_on};
+use crate::scene::alone;
+use crate::task::{TABLE, TaskKind, TaskSpec};
+use glam::{DMat3, DQuat, DVec3};
+use hingecast_geom::{JointKind, Pose, Screw};
+use mujoco_rs::prelude::*;
+use std::f64::consts::{FRAC_PI_2, FRAC_PI_4};
+use std::path::Path;
+use std::sync::Arc;
+
+const GRIPPER: &str = include_str!("../assets/gripper.xml");
+/// The hand opens 80 mm; a person leaves some room.
+const WIDEST: f64 = 0.07;
+/// Thinner things than a sheet of card are not pinched reliably.
+const THINNEST: f64 = 0.003;
+/// How deep the pads' middle may sit below the surface that is met first, m. The pads reach 9 mm farther.
+const DEPTHS: [f64; 3] = [0.008, 0.016, 0.024];
+/// How far the hand may lean back from pointing down when it comes from a side, rad. The sixth joint ends at 3.75 rad, 0.8 beyond
+/// the start; a level hand needs the fifth joint at its stop.
+const TILTS: [f64; 5] = [0.5, 0.75, 1.0, 1.3, FRAC_PI_2];
+/// The last stretch of the approach must be free, m.
+const APPROACH: [f64; 3] = [0.0, 0.04, 0.09];
+/// Shares of the range at which the hand must still fit.
+const ALONG: [f64; 3] = [0.2, 0.4, 0.6];
+/// Overlap that contact may have there, m: the part rocks between the pads.
+const ROCKING: f64 = 0.004;
+/// Longest way of the grasp to 60 % of the range, m: beyond it the arm would have to reach around the object.
+const LONGEST_WAY: f64 = 0.25;
+/// Highest grasp above the table on that way, m.
+const HIGHEST: f64 = 0.4;
+/// Largest diagonal of the object, m.
+const LARGEST: f64 = 0.75;
+/// Where the middle of the way shall be on the table, m from its centre towards the far side: in front of the arm with room on
+/// both sides. The covered box comes out at simulation.md's x 0..0.06.
+const MIDDLE: f64 = 0.0375;
+
+/// A hand that leans stands between the arm and the grasp: so much farther away the object is put when it lies level, m.
+const BEHIND: f64 = 0.12;
+
+/// One place to hold, with the object's turn on the table.
+#[derive(Clone, Debug)]
+pub struct Candidate {
+    pub task: TaskSpec,
+    pub score: f64,
+}
+
+/// How large the object shall be.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Size {
+    /// Simulated metres per unit of the file.
+    Exactly(f64),
+    /// So many times what the arm reaches with ease, at most 1 metre per unit.
+    Reachable(f64),
+}
+
+type Probe = MjData<Arc<MjModel>>;
+
+/// Tasks on this object, best first: one per place to hold. Empty when the gripper fits nowhere.
+///
+/// # Errors
+/// When the model cannot be loaded, nothing moves, or `joint` is not there.
+pub fn candidates(path: &Path, kind: TaskKind, joint: Option<&str>, size: Size) -> Result<Vec<Candidate>, SimError> {
+    let data = alone(path, 1.0, Some(GRIPPER))?;
+    let all = object::joints(data.model());
+    let names: Vec<&str> = all.iter().map(|j| j.name.as_str()).collect();
+    let place = path.display().to_string();
+    if all.is_empty() {
+        return Err(SimError::task(
+            "nothing moves: the model has no hinge and no slide",
+            place,
+            "look at the run's report for parts that were missed, or take another object",
+        ));
+    }
+    if let Some(name) = joint.filter(|n| !names.contains(n)) {
+        return Err(SimError::task(
+            format!("no joint '{name}' in the model"),
+            place,
+            format!("its hinges and slides are: {}", names.join(", ")),
+        ));
+    }
+    let mut out = Vec::new();
+    for j in all.iter().filter(|j| joint.is_none_or(|n| n == j.name)) {
+        let s = match size {
+            Size::Exactly(s) => s,
+            Size::Reachable(factor) => two_digits((factor * reachable_scale(&mut data_at(&data), j)).min(1.0)),
+        };
+        out.extend(at_scale(path, kind, &j.name, s)?);
+    }
+    out.sort_by(|a, b| b.score.total_cmp(&a.score));
+    Ok(distinct(out))
+}
+
+fn data_at(data: &Probe) -> Probe {
+    let mut copy = MjData::new(data.model_clone());
+    copy.kinematics();
+    copy
+}
+
+/// Two digits: a twin whose box differs by a voxel gets the same scale.
+fn two_digits(s: f64) -> f64 {
+    let unit = 10f64.powf(s.log10().floor() - 1.0);
+    (s / unit).floor() * unit
+}
+
+/// At most 1; so that the farthest point of the part neither travels nor stands beyond what the arm does with ease.
+fn reachable_scale(data: &mut Probe, joint: &ObjectJoint) -> f64 {
+    let (closed, open) = ends(data, joint);
+    pose_joint(data, joint, closed);
+    let Some([lo, hi]) = bounds(data, |g| is_object(data.model(), g)) else { return 1.0 };
+    let part = bounds(data, |g| is_part(data.model(), g, joint)).unwrap_or([lo, hi]);
+    let screw = screw(data, joint);
+    let motion = screw.motion(0.6 * (open - closed));
+    let corner = |k: usize| {
+        let pick = |bit: usize, l: f64, h: f64| if k >> bit & 1 == 0 { l } else { h };
+        DVec3::new(pick(0, part[0].x, part[1].x), pick(1, part[0].y, part[1].y), pick(2, part[0].z, part[1].z))
+    };
+    // The grasp is somewhere short of the farthest corner; 0.85 of it is usual.
+    let way = 0.85 * (0..8).map(|k| motion.apply(corner(k)).distance(corner(k))).fold(0.0, f64::max);
+    let top = (0..8).map(|k| motion.apply(corner(k)).z.max(corner(k).z) - lo.z).fold(0.0, f64::max);
+    let limits = [LONGEST_WAY / way, HIGHEST / top, LARGEST / (hi - lo).length()];
+    two_digits(limits.into_iter().filter(|s| s.is_finite() && *s > 0.0).fold(1.0, f64::min))
+}
+
+fn at_scale(path: &Path, kind: TaskKind, name: &str, scale: f64) -> Result<Vec<Candidate>, SimError> {
+    let mut data = alone(path, scale, Some(GRIPPER))?;
+    park_gripper(&mut data);
+    let Some(joint) = object::joints(data.model()).into_iter().find(|j| j.name == name) else { return Ok(Vec::new()) };
+    let (closed, open) = ends(&mut data, &joint);
+    pose_joint(&mut data, &joint, closed);
+    let Some([low, _]) = bounds(&data, |g| is_object(data.model(), g)) else { return Ok(Vec::new()) };
+    let Some(part) = bounds(&data, |g| is_part(data.model(), g, &joint)) else { return Ok(Vec::new()) };
+    let screw = screw(&mut data, &joint);
+    let search = Search { closed, open, screw, low: low.z, part, joint };
+    let mut base = TaskSpec::new(kind, name, scale);
+    base.part_centre = 0.5 * (part[0] + part[1]);
+    base.travel = (open - closed).abs();
+    let mut out = Vec::new();
+    for (approach, closing) in directions() {
+        out.extend(search.scan(&mut data, approach, closing, &base));
+    }
+    Ok(out)
+}
+
+/// Closed is the end at which the object is more compact; where both are alike, the one nearer to the recorded zero.
+fn ends(data: &mut Probe, joint: &ObjectJoint) -> (f64, f64) {
+    let volume = joint.range.map(|q| {
+        pose_joint(data, joint, q);
+        bounds(data, |g| is_object(data.model(), g)).map_or(0.0, |[lo, hi]| {
+            let size = hi - lo;
+            size.x * size.y * size.z
+        })
+    });
+    let [lo, hi] = joint.range;
+    let first = if (volume[0] - volume[1]).abs() < 0.02 * volume[0].max(volume[1]) {
+        lo.abs() <= hi.abs()
+    } else {
+        volume[0] < volume[1]
+    };
+    if first { (lo, hi) } else { (hi, lo) }
+}
+
+/// Ways to come and directions to close, base frame.
+fn directions() -> Vec<(DVec3, DVec3)> {
+    let mut out: Vec<(DVec3, DVec3)> = (0..4)
+        .map(|k| (DVec3::NEG_Z, DVec3::new((k as f64 * FRAC_PI_4).cos(), (k as f64 * FRAC_PI_4).sin(), 0.0)))
+        .collect();
+    for ahead in [DVec3::X, DVec3::NEG_X, DVec3::Y, DVec3::NEG_Y] {
+        for tilt in TILTS {
+            let approach = ahead * tilt.sin() - DVec3::Z * tilt.cos();
+            let side = ahead.cross(DVec3::Z);
+            out.push((approach, side));
+            out.push((approach, side.cross(approach)));
+        }
+    }
+    out
+}
+
+struct Search {
+    joint: ObjectJoint,
+    closed: f64,
+    open: f64,
+    /// Base frame, joint closed.
+    screw: Screw,
+    /// Lowest point of the object: the table.
+    low: f64,
+    part: [DVec3; 2],
+}
+
+impl Search {
+    fn scan(&self, data: &mut Probe, approach: DVec3, closing: DVec3, base: &TaskSpec) -> Vec<Candidate> {
+        let side = approach.cross(closing);
+        let [lo, hi] = self.part;
+        let extent = |d: DVec3| {
+            let half = 0.5 * (hi - lo);
+            (0.5 * (lo + hi).dot(d), half.dot(d.abs()))
+        };
+        let ((cu, hu), (cv, hv), (ca, ha)) = (extent(closing), extent(side), extent(approach));
+        let step = (2.0 * hu.max(hv) / 48.0).max(0.004);
+        let (nu, nv) = ((hu / step).ceil() as i32, (hv / step).ceil() as i32);
+        // First pass: where would the fingers meet the part on both sides?
+        let mut hits: Vec<(i32, i32, DVec3, f64)> = Vec::new();
+        for u in -nu..=nu {
+            for v in -nv..=nv {
+                let above =
+                    closing * (cu + u as f64 * step) + side * (cv + v as f64 * step) + approach * (ca - ha - 0.2);
+                if let Some((point, width)) = self.pinch(data, above, approach, closing) {
+                    hits.push((u, v, point, width));
+                }
+            }
+        }
+        let mut out = Vec::new();
+        for &(u, v, point, width) in &hits {
+            // A place whose neighbours could be held as well forgives errors.
+            let room = hits.iter().filter(|h| (h.0 - u).abs() <= 3 && (h.1 - v).abs() <= 3).count() as f64 / 49.0;
+            let grasp = Pose::from_mat3_trans(DMat3::from_cols(closing.cross(approach), closing, approach), point);
+            for turn_wrist in self.wrists(closing) {
+                if let Some(c) = self.judge(data, &grasp, width, room, turn_wrist, base) {
+                    out.push(c);
+                }
+            }
+        }
+        out
+    }
+
+    /// Follows a ray to the part and measures its thickness a little deeper: the middle between the fingers, and the width.
+    fn pinch(&self, data: &mut Probe, from: DVec3, approach: DVec3, closing: DVec3) -> Option<(DVec3, f64)> {
+        let met = self.ray(data, from, approach)?;
+        // Deepest first: a better hold, where there is one.
+        DEPTHS.iter().rev().find_map(|depth| {
+            let at = from + approach * (met + depth);
+            let reach = 0.5 * 0.08;
+            let near = self.ray(data, at - closing * reach, closing)?;
+            let far = self.ray(data, at + closing * reach, -closing)?;
+            let width = 2.0 * reach - near - far;
+            let middle = at + closing * (0.5 * (near - far));
+            ((THINNEST..=WIDEST).contains(&width)).then_some((middle, width))
+        })
+    }
+
+    /// Distance to the moving part, if it is the first thing met. A start inside a solid meets nothing.
+    fn ray(&self, data: &mut Probe, from: DVec3, direction: DVec3) -> Option<f64> {
+        let groups = [1, 1, 1, 1, 1, 0];
+        let (geom, distance) = data.ray(&from.to_array(), &direction.to_array(), Some(&groups), true, None, None);
+        geom.filter(|&g| is_part(data.model(), g, &self.joint)).map(|_| distance)
+    }
+
+    /// Whether the wrist turns with the part.
+    fn wrists(&self, closing: DVec3) -> Vec<bool> {
+        let along_axis = closing.dot(self.screw.axis).abs();
+        if self.screw.kind == JointKind::Prismatic || along_axis > 0.9 { vec![false] } else { vec![true] }
+    }
+
+    /// Does the open hand fit there, on the way there and along the joint's way? Then: how good is it?
+    fn judge(
+        &self,
+        data: &mut Probe,
+        grasp: &Pose,
+        width: f64,
+        room: f64,
+        turn_wrist: bool,
+        base: &TaskSpec,
+    ) -> Option<Candidate> {
+        let approach = grasp.rotate(DVec3::Z);
+        pose_joint(data, &self.joint, self.closed);
+        for back in APPROACH {
+            let pose = Pose::new(grasp.rot, grasp.trans - approach * back);
+            if !self.fits(data, &pose, 0.0) {
+                return None;
+            }
+        }
+        let span = self.open - self.closed;
+        for share in ALONG {
+            pose_joint(data, &self.joint, self.closed + share * span);
+            let moved = self.screw.motion(share * span) * *grasp;
+            let pose = Pose::new(if turn_wrist { moved.rot } else { grasp.rot }, moved.trans);
+            if !self.fits(data, &pose, ROCKING) {
+                return None;
+            }
+        }
+        pose_joint(data, &self.joint, self.closed);
+
+        let way = self.screw.motion(0.6 * span).apply(grasp.trans) - grasp.trans;
+        let yaw = self.best_yaw(grasp, way)?;
+        let turn = DQuat::from_rotation_z(yaw);
+        let towards_arm = -(turn * way).normalize_or_zero().x;
+        let lever = if self.screw.kind.turns() {
+            let farthest = 0.5 * (self.part[1] - self.part[0]).length() + self.screw.distance(base.part_centre);
+            self.screw.distance(grasp.trans) / farthest.max(1e-9)
+        } else {
+            // A drawer is pulled in its middle, else it binds.
+            let off = grasp.trans - base.part_centre;
+            1.0 - off.reject_from_normalized(self.screw.axis).length()
+                / (self.part[1] - self.part[0]).length().max(1e-9)
+        };
+        // The less the hand leans, the farther the wrist is from its stops.
+        let score = 1.2 * lever - 2.0 * approach.z + 0.4 * room - 3.0 * width
+            + 0.4 * towards_arm
+            + if turn_wrist { 0.0 } else { 0.4 };
+
+        let mut task = base.clone();
+        task.width = width;
+        task.turn_wrist = turn_wrist;
+        task.grasp = *grasp;
+        // The hand may come with either finger first: as it hangs at the start is less turning.
+        let world = turn * grasp.rot;
+        let flipped = grasp.rot * DQuat::from_rotation_z(std::f64::consts::PI);
+        let start = crate::env::GRIPPER_DOWN;
+        if (turn * flipped).dot(start).abs() > world.dot(start).abs() {
+            task.grasp.rot = flipped;
+        }
+        let middle = turn * (grasp.trans + 0.5 * way);
+        let ahead = MIDDLE + BEHIND * (1.0 - approach.z * approach.z).max(0.0).sqrt();
+        task.place = Pose::new(turn, DVec3::new(ahead - middle.x, -middle.y, TABLE - self.low));
+        Some(Candidate { task, score })
+    }
+
+    /// Which side of the object faces the arm: the hand comes from above or away from the arm, and the way leads towards
+    /// the arm, or else the wrist has to bend back on itself.
+    fn best_yaw(&self, grasp: &Pose, way: DVec3) -> Option<f64> {
+        let yaws = (0..4).map(|k| k as f64 * FRAC_PI_2);
+        let approach = grasp.rotate(DVec3::Z);
+        let fine = yaws.filter(|&y| approach.z < -0.99 || (DQuat::from_rotation_z(y) * approach).x > 0.3);
+        // Doors swing more outwards than sideways: the larger component decides, as rounding to quarter turns does.
+        let towards = |yaw: f64| -(DQuat::from_rotation_z(yaw) * way).x;
+        fine.max_by(|a, b| towards(*a).total_cmp(&towards(*b)))
+    }
+
+    /// No contact of the hand deeper than `slack`, and the hand above the table. With slack, fingers may touch the part itself.
+    fn fits(&self, data: &mut Probe, pose: &Pose, slack: f64) -> bool {
+        place_gripper(data, pose);
+        data.kinematics();
+        data.com_pos();
+        data.collision();
+        let model = data.model();
+        let [low, _] = bounds(data, |g| !is_object(model, g)).unwrap_or([DVec3::splat(f64::MAX); 2]);
+        if low.z < self.low + 0.003 {
+            return false;
+        }
+        data.contact().iter().all(|c| {
+            let [a, b] = c.geom.map(|g| g.max(0) as usize);
+            let (hand, other) = match (is_object(model, a), is_object(model, b)) {
+                (false, true) => (a, b),
+                (true, false) => (b, a),
+                _ => return true,
+            };
+            let palm = model.id_to_name(MjtObjBase::mjOBJ_GEOM, hand) == Some("hand");
+            let rocking = slack > 0.0 && !palm && is_part(model, other, &self.joint);
+            rocking || c.dist > -slack
+        })
+    }
+}
+
+/// Of candidates that are nearly the same, the best one.
+fn distinct(sorted: Vec<Candidate>) -> Vec<Candidate> {
+    let mut out: Vec<Candidate> = Vec::new();
+    for c in sorted {
+        let same = |o: &Candidate| {
+            o.task.joint == c.task.joint
+                && o.task.grasp.trans.distance(c.task.grasp.trans) < 0.02
+                && (o.task.grasp.rot.inverse() * c.task.grasp.rot).w.abs() > 0.99
+        };
+        if !out.iter().any(same) {
+            out.push(c);
+        }
+        if out.len() == 24 {
+            break;
+        }
+    }
+    out
+}
+
+fn is_object(model: &MjModel, geom: usize) -> bool {
+    let gripper = model.name_to_id(MjtObjBase::mjOBJ_BODY, "gripper");
+    Some(model.geom_bodyid()[geom] as usize) != gripper
+}
+
+fn is_part(model: &MjModel, geom: usize, joint: &ObjectJoint) -> bool {
+    hangs_on(model, model.geom_bodyid()[geom] as usize, joint.body)
+}
+
+fn pose_joint(data: &mut Probe, joint: &ObjectJoint, q: f64) {
+    data.qpos_mut()[joint.qpos] = q;
+    data.kinematics();
+}
+
+fn place_gripper(data: &mut Probe, pose: &Pose) {
+    let q = data.qpos_mut();
+    q[..3].copy_from_slice(&pose.trans.to_array());
+    q[3..7].copy_from_slice(&[pose.rot.w, pose.rot.x, pose.rot.y, pose.rot.z]);
+}
+
+fn park_gripper(data: &mut Probe) {
+    place_gripper(data, &Pose::from_trans(DVec3::new(0.0, 0.0, 50.0)));
+}
+
+/// The joint's motion in the base frame, from where it stands now.
+fn screw(data: &mut Probe, joint: &ObjectJoint) -> Screw {
+    data.kinematics();
+    let pose = body_pose(data, joint.body);
+    let model = data.model();
+    Screw {
+        kind: if joint.slides { JointKind::Prismatic } else { JointKind::Revolute },
+        axis: pose.rotate(DVec3::from(model.jnt_axis()[joint.id])),
+        pivot: pose.apply(DVec3::from(model.jnt_pos()[joint.id])),
+    }
+}

@@ -1,0 +1,93 @@
+//! Makes the task of an object: geometry proposes places to hold, the demonstrator tries the best of them in the simulator, and the
+//! first that works is taken. Geometry does not know the arm's reach; a try does.
+
+use crate::env::{Env, Outcome};
+use crate::expert::Expert;
+use crate::grasp::{self, Size};
+use crate::scene::{Scene, SceneConfig};
+use crate::task::{TaskKind, TaskSpec};
+use crate::{SimError, object};
+use std::path::Path;
+
+/// Tries per place, and how many of them must succeed to look no further.
+const TRIES: u64 = 3;
+/// Sizes that are tried, times what the arm reaches with ease: a handle may be too thick for the gripper or too near to the next.
+const SIZES: [f64; 4] = [1.0, 0.75, 1.4, 0.55];
+
+/// What was found out on the way.
+#[derive(Clone, Debug)]
+pub struct Made {
+    pub task: TaskSpec,
+    /// Successes of `TRIES` with the place that was taken.
+    pub worked: usize,
+    pub of: usize,
+}
+
+/// # Errors
+/// When the gripper fits nowhere, or the demonstrator never succeeds.
+pub fn make_task(path: &Path, kind: TaskKind, joint: Option<&str>, scale: Option<f64>) -> Result<Made, SimError> {
+    if let Some(s) = scale.filter(|s| !(s.is_finite() && *s > 0.0)) {
+        return Err(SimError::task(
+            format!("{s} is not a size"),
+            "--scale",
+            "simulated metres per unit of the model, for instance 0.5",
+        ));
+    }
+    let path = object::model_file(path)?;
+    let place = path.display().to_string();
+    let sizes: Vec<Size> = match scale {
+        Some(s) => vec![Size::Exactly(s)],
+        None => SIZES.iter().map(|f| Size::Reachable(*f)).collect(),
+    };
+    let config = SceneConfig { object: path.clone(), spoil: Vec::new(), visuals: false };
+    let mut best: Option<Made> = None;
+    let mut places = 0;
+    'sizes: for size in sizes {
+        for candidate in grasp::candidates(&path, kind, joint, size)? {
+            places += 1;
+            let scene = Scene::new(&config, &candidate.task)?;
+            let mut env = Env::new(&scene);
+            // Seeds far from those of demonstrations and rollouts.
+            let runs = (0..TRIES).map(|k| demonstrate(&mut env, u64::MAX - k, |_, _| ()));
+            let worked = runs.collect::<Result<Vec<_>, _>>()?.iter().filter(|o| **o == Outcome::Success).count();
+            if best.as_ref().is_none_or(|b| worked > b.worked) {
+                best = Some(Made { task: candidate.task, worked, of: TRIES as usize });
+            }
+            if worked == TRIES as usize {
+                break 'sizes;
+            }
+        }
+    }
+    match best {
+        Some(made) if made.worked > 0 => Ok(made),
+        Some(_) => Err(SimError::task(
+            format!("the demonstrator opened it in none of {} tries at {places} places", TRIES * places),
+            place,
+            "--joint for another joint, or --scale for another size: it may be out of reach or stuck",
+        )),
+        None => Err(SimError::task(
+            "the gripper (80 mm wide open) can close on no part that moves",
+            place,
+            "--joint for another joint, or --scale for a smaller object",
+        )),
+    }
+}
+
+/// One episode of the demonstrator from `seed`; `each` sees the environment before every action. Ends at success or
+/// at the horizon.
+///
+/// # Errors
+/// Never in practice: the demonstrator's actions are finite.
+pub fn demonstrate(env: &mut Env, seed: u64, mut each: impl FnMut(&Env, &[f64; 7])) -> Result<Outcome, SimError> {
+    env.reset(seed);
+    let mut expert = Expert::new(seed);
+    for _ in 0..env.scene.task.horizon {
+        let action = expert.act(env);
+        each(env, &action);
+        env.step(&action)?;
+        if env.success() {
+            break;
+        }
+    }
+    Ok(env.outcome())
+}
