@@ -36,7 +36,15 @@ fn a_policy_from_the_command_line() {
     assert!(json["train_loss"].is_f64() && json["valid_loss"].is_f64(), "{answer}");
     let names = common::files(&dir.join("policy"));
     let names: Vec<_> = names.iter().map(|n| n.to_string_lossy()).collect();
-    let all = ["checkpoint.safetensors", "loss.svg", "losses.csv", "policy.json", "policy.safetensors", "train.toml"];
+    let all = [
+        "checkpoint.safetensors",
+        "env_args.json",
+        "loss.svg",
+        "losses.csv",
+        "policy.json",
+        "policy.safetensors",
+        "train.toml",
+    ];
     assert_eq!(names, all);
     let again = hingecast(dir, &line).done();
     assert!(again.stderr.contains("went on from step 60"), "{again}");

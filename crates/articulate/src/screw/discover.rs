@@ -18,8 +18,6 @@ pub struct Discovery {
     pub tree: KinematicTree,
     /// Per part, per sample.
     pub verdicts: Vec<Vec<Verdict>>,
-    /// Share of the samples that no part explains.
-    pub unexplained: f64,
     /// Contradictions that a part has to remove to be worth having.
     pub cost: f64,
 }
@@ -88,10 +86,7 @@ pub fn discover(
         }
     }
     let best = front.into_iter().chain(best).max_by(|a, b| a.merit.total_cmp(&b.merit)).expect("the first node");
-    let contradicted = |i: &usize| best.verdicts.iter().all(|v| v[*i].against != 0);
-    let unexplained =
-        best.open.iter().filter(|i| contradicted(i)).count() as f64 / evidence.samples.len().max(1) as f64;
-    Ok(Discovery { tree: best.tree, verdicts: best.verdicts, unexplained, cost })
+    Ok(Discovery { tree: best.tree, verdicts: best.verdicts, cost })
 }
 
 /// The `width` best ways to add a part.

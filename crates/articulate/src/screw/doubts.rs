@@ -39,13 +39,7 @@ pub struct Rival {
 }
 
 /// Doubts, gravest first, and the rivals that were tried. `clouds`: the part of every point of every state's cloud.
-pub fn doubts(
-    evidence: &Evidence,
-    found: &Settled,
-    clouds: &[Vec<u8>],
-    unexplained: f64,
-    seed: u64,
-) -> (Vec<String>, Vec<Rival>) {
+pub fn doubts(evidence: &Evidence, found: &Settled, clouds: &[Vec<u8>], seed: u64) -> (Vec<String>, Vec<Rival>) {
     let mut out = Vec::new();
     let mut rivals = Vec::new();
     let tree = &found.tree;
@@ -89,10 +83,10 @@ pub fn doubts(
             ));
         }
     }
-    if unexplained > UNEXPLAINED {
+    if found.unexplained > UNEXPLAINED {
         out.push(format!(
             "{:.1} % of the surface moved in a way that no part explains (soft, or too small a part, or frames that differ)",
-            100.0 * unexplained
+            100.0 * found.unexplained
         ));
     }
     (out, rivals)

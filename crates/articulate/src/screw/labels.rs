@@ -83,10 +83,63 @@ pub fn label_clouds(evidence: &Evidence, tree: &KinematicTree) -> Vec<Vec<u8>> {
             });
         }
     }
-    let labels = |(costs, near): (&Vec<f32>, &Vec<Near>)| {
-        smooth(costs, near, n_parts).chunks_exact(n_parts).map(|c| cheapest(n_parts, |p| c[p])).collect()
+    let label = |state: usize| {
+        let smoothed = smooth(&costs[state], &near[state], n_parts);
+        let mut labels: Vec<u8> = smoothed.chunks_exact(n_parts).map(|c| cheapest(n_parts, |p| c[p])).collect();
+        let cloud = &evidence.clouds[state];
+        whole_patches(&mut labels, cloud, &near[state], &verdicts[state], n_parts, evidence.lattice.voxel);
+        labels
     };
-    costs.iter().zip(&near).map(labels).collect()
+    (0..n_states).into_par_iter().map(label).collect()
+}
+
+/// A flat patch has at least this many samples.
+const PATCH: usize = 30;
+/// Contradicted share of a patch up to which a part can own all of it, and from which on it cannot.
+const CLEAN: f32 = 0.03;
+const SOILED: f32 = 0.10;
+
+/// A connected flat patch that one part alone can own without contradictions is that part's. The wall of a drawer slides in its own
+/// plane: deep inside it could stand still as well, but where it sticks out it cannot, and it is one wall.
+fn whole_patches(labels: &mut [u8], cloud: &Surface, near: &[Near], verdicts: &[Verdict], n_parts: usize, voxel: f32) {
+    let (points, normals) = (&cloud.points, &cloud.normals);
+    let flat = |i: usize, j: usize| {
+        let gap = points[j] - points[i];
+        normals[i].dot(normals[j]) > 0.97 && gap.length() < 2.0 * voxel && normals[i].dot(gap).abs() < 0.3 * voxel
+    };
+    let mut seen = vec![false; labels.len()];
+    for first in 0..labels.len() {
+        if std::mem::replace(&mut seen[first], true) {
+            continue;
+        }
+        let mut patch = vec![first];
+        let mut next = 0;
+        while next < patch.len() {
+            let i = patch[next];
+            next += 1;
+            for &(j, _) in &near[i] {
+                let j = j as usize;
+                if !seen[j] && flat(i, j) {
+                    seen[j] = true;
+                    patch.push(j);
+                }
+            }
+        }
+        if patch.len() < PATCH {
+            continue;
+        }
+        let soiled = |p: usize| {
+            let against = patch.iter().filter(|&&i| verdicts[i * n_parts + p].against != 0).count();
+            against as f32 / patch.len() as f32
+        };
+        let shares: Vec<f32> = (0..n_parts).map(soiled).collect();
+        let clean: Vec<usize> = (0..n_parts).filter(|&p| shares[p] < SOILED).collect();
+        if let [owner] = clean[..]
+            && shares[owner] < CLEAN
+        {
+            patch.iter().for_each(|&i| labels[i] = owner as u8);
+        }
+    }
 }
 
 fn sample(cloud: &Surface, state: usize, i: usize) -> Sample {

@@ -111,7 +111,7 @@ pub fn run<E: From<Cancelled>>(
         views.iter_mut().for_each(|c| *c = *c * rig.inverse());
     }
     let labels = labels::label_clouds(&evidence, &settled.tree);
-    let (doubts, rivals) = doubts::doubts(&evidence, &settled, &labels, discovery.unexplained, seed);
+    let (doubts, rivals) = doubts::doubts(&evidence, &settled, &labels, seed);
     let of_state = |(state, own): (usize, &Vec<u8>)| -> Vec<Labelled> {
         let points = &evidence.clouds[state].points;
         points.iter().zip(own).map(|(point, part)| Labelled { state, point: *point, part: *part }).collect()

@@ -6,11 +6,13 @@ use super::cameras::{mean_point, without_mean};
 use super::discover::{Discovery, poses_of};
 use super::doubts::{REFUTED, rival};
 use super::evidence::{Evidence, Motion, Sample, Verdict, contradictions};
+use super::hypotheses::nearest_screw;
 use super::labels::label;
 use super::refine::{Report, Settings, refine};
 use crate::icp::{self, Surface};
-use glam::Vec3;
-use hingecast_geom::{KinematicTree, Pose};
+use glam::{DVec3, Vec3};
+use hingecast_geom::pose::rotation_vector;
+use hingecast_geom::{JointKind, KinematicTree, Pose, Screw};
 use rayon::prelude::*;
 
 /// The final tree, and what it was found with.
@@ -21,6 +23,8 @@ pub struct Settled {
     /// Per state: world from the world that its cameras believed in.
     pub rig: Vec<Pose>,
     pub report: Report,
+    /// Share of the samples that every part contradicts.
+    pub unexplained: f64,
 }
 
 /// Samples that hold a state's frame.
@@ -39,8 +43,10 @@ pub fn settle(evidence: &mut Evidence, found: &Discovery, seed: u64) -> Settled 
     let mut rig = vec![Pose::IDENTITY; n_states];
     let mut labels = label(evidence, &found.verdicts);
     ask_again(evidence, &mut tree, &labels, seed);
-    labels = label(evidence, &prune(evidence, &mut tree, found.cost));
+    let mut verdicts = prune(evidence, &mut tree, found.cost);
+    labels = label(evidence, &verdicts);
     slides(evidence, &mut tree, &labels, seed);
+    simplify(evidence, &mut tree, &labels);
     let free = vec![true; tree.joints.len()];
     let noisy = evidence.tolerance > SHARP * 4.0 * evidence.lattice.voxel;
     let mut report = Report::default();
@@ -57,10 +63,13 @@ pub fn settle(evidence: &mut Evidence, found: &Discovery, seed: u64) -> Settled 
         let gate = if round == 0 { 1.0 } else { 0.6 } * voxel;
         let settings = Settings { gates: [gate, 0.5 * gate], rounds: 6, partners: 6 };
         report = refine(evidence, &mut tree, &members, &free, &settings, seed ^ round);
-        labels = label(evidence, &judge_all(evidence, &tree));
+        verdicts = judge_all(evidence, &tree);
+        labels = label(evidence, &verdicts);
     }
+    let n = evidence.samples.len();
+    let unexplained = (0..n).filter(|&i| verdicts.iter().all(|v| v[i].against != 0)).count() as f64 / n.max(1) as f64;
     tidy(&mut tree);
-    Settled { tree, labels, rig, report }
+    Settled { tree, labels, rig, report, unexplained }
 }
 
 /// The verdicts on every sample under every part.
@@ -109,6 +118,48 @@ fn slides(evidence: &Evidence, tree: &mut KinematicTree, labels: &[u8], seed: u6
             *tree = slide;
         }
     }
+}
+
+/// Samples may be off by this many voxels when a part is hung on its grandparent.
+const ALIKE: f64 = 1.0;
+
+/// Hangs parts on their grandparents where one screw says as much there: of two drawers that slide alike, neither carries the other.
+fn simplify(evidence: &Evidence, tree: &mut KinematicTree, labels: &[u8]) {
+    let n_states = evidence.n_states();
+    for j in 0..tree.joints.len() {
+        while let Some(up) = tree.joints.iter().find(|up| up.child == tree.joints[j].parent).cloned() {
+            let joint = &tree.joints[j];
+            // Motion of the part in its grandparent's frame, and where its samples are in the canonical frame.
+            let motions: Vec<Pose> =
+                (0..n_states).map(|s| up.screw.motion(up.values[s]) * joint.screw.motion(joint.values[s])).collect();
+            let poses = poses_of(tree, joint.child, n_states);
+            let own = members(evidence, labels, joint.child);
+            let stride = own.len().div_ceil(ASKING).max(1);
+            let points: Vec<DVec3> =
+                own.iter().step_by(stride).map(|(s, _)| poses[s.state].inverse().apply(s.point.as_dvec3())).collect();
+            let tolerance = ALIKE * evidence.lattice.voxel as f64;
+            let Some((screw, values)) = one_screw(&motions, &points, joint.screw.kind, tolerance) else { break };
+            let joint = &mut tree.joints[j];
+            (joint.parent, joint.screw, joint.values) = (up.parent, screw, values);
+        }
+    }
+}
+
+/// The screw and values that move `points` as `motions` (the first is none) do, to within `tolerance`.
+fn one_screw(motions: &[Pose], points: &[DVec3], kind: JointKind, tolerance: f64) -> Option<(Screw, Vec<f64>)> {
+    let centre = points.iter().sum::<DVec3>() / points.len().max(1) as f64;
+    let size = |p: &Pose| p.angle() + (p.apply(centre) - centre).length();
+    let far = motions.iter().max_by(|a, b| size(a).total_cmp(&size(b)))?;
+    let (screw, _) = nearest_screw(far, kind, centre)?;
+    let value = |p: &Pose| {
+        if kind.turns() { rotation_vector(p.rot).dot(screw.axis) } else { (p.apply(centre) - centre).dot(screw.axis) }
+    };
+    let values: Vec<f64> = motions.iter().map(value).collect();
+    let alike = |(q, motion): (&f64, &Pose)| {
+        let moved = screw.motion(*q);
+        points.iter().all(|x| moved.apply(*x).distance(motion.apply(*x)) < tolerance)
+    };
+    values.iter().zip(motions).all(alike).then_some((screw, values))
 }
 
 /// Samples that ask for a value.
