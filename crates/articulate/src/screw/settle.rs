@@ -248,3 +248,25 @@ fn tidy(tree: &mut KinematicTree) {
         joint.limits = joint.values.iter().fold([0.0f64; 2], |l, v| [l[0].min(*v), l[1].max(*v)]);
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn slides_along_one_line_are_one_slide_and_a_chain_of_hinges_is_none() {
+        let slide = Screw { kind: JointKind::Prismatic, axis: DVec3::X, pivot: DVec3::ZERO };
+        let hinge = |x: f64| Screw { kind: JointKind::Revolute, axis: DVec3::Z, pivot: DVec3::new(x, 0.0, 0.0) };
+        let values = [[0.0, 0.0], [0.3, 0.0], [0.3, 0.2], [0.1, 0.5]];
+        let points = [DVec3::new(1.0, 0.2, 0.0), DVec3::new(1.4, -0.2, 0.3), DVec3::new(1.2, 0.1, -0.2)];
+        let together = |up: Screw, own: Screw| -> Vec<Pose> {
+            values.iter().map(|v| up.motion(v[0]) * own.motion(v[1])).collect()
+        };
+        let (screw, sums) = one_screw(&together(slide, slide), &points, slide.kind, 1e-6).unwrap();
+        assert!(screw.axis.cross(DVec3::X).length() < 1e-9, "{screw:?}");
+        for (sum, v) in sums.iter().zip(values) {
+            assert!((sum * screw.axis.x - v[0] - v[1]).abs() < 1e-9, "{sums:?}");
+        }
+        assert!(one_screw(&together(hinge(0.0), hinge(1.0)), &points, JointKind::Revolute, 1e-3).is_none());
+    }
+}
