@@ -98,6 +98,8 @@ const PATCH: usize = 30;
 /// Contradicted share of a patch up to which a part can own all of it, and from which on it cannot.
 const CLEAN: f32 = 0.03;
 const SOILED: f32 = 0.10;
+/// Share of a patch that must be its owner's already: thin lips are contradicted by noise alone.
+const BEGUN: f32 = 0.3;
 
 /// A connected flat patch that one part alone can own without contradictions is that part's. The wall of a drawer slides in its own
 /// plane: deep inside it could stand still as well, but where it sticks out it cannot, and it is one wall.
@@ -134,8 +136,10 @@ fn whole_patches(labels: &mut [u8], cloud: &Surface, near: &[Near], verdicts: &[
         };
         let shares: Vec<f32> = (0..n_parts).map(soiled).collect();
         let clean: Vec<usize> = (0..n_parts).filter(|&p| shares[p] < SOILED).collect();
+        let begun = |p: usize| patch.iter().filter(|&&i| labels[i] as usize == p).count() as f32;
         if let [owner] = clean[..]
             && shares[owner] < CLEAN
+            && begun(owner) > BEGUN * patch.len() as f32
         {
             patch.iter().for_each(|&i| labels[i] = owner as u8);
         }
