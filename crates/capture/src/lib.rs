@@ -10,13 +10,13 @@
 //! Cameras are OpenCV (x right, y down, z forward), pixel centres at +0.5, depth is z, 0 = unknown.
 
 pub mod check;
-pub mod error;
 pub mod import;
 pub mod object;
 pub mod recording;
 pub mod synth;
 pub mod truth;
 
-pub use error::CaptureError;
+/// What is wrong with a recording, an object or a plan of one.
+pub use hingecast_geom::InputError as CaptureError;
 pub use recording::{Frame, Recording, Split, View, ViewCache};
 pub use truth::Truth;

@@ -7,17 +7,21 @@
 //! - poses and joints are f64, gaussians and pixels f32; quaternions are written w x y z in files.
 
 pub mod camera;
+pub mod folder;
 pub mod gaussians;
+pub mod input_error;
 pub mod mesh;
 pub mod mesh_io;
 pub mod nearest;
 pub mod ply;
 pub mod pose;
 pub mod progress;
+pub mod random;
 pub mod tree;
 
 pub use camera::Camera;
 pub use gaussians::Gaussians;
+pub use input_error::InputError;
 pub use mesh::TriMesh;
 pub use nearest::PointTree;
 pub use pose::Pose;

@@ -146,6 +146,26 @@ impl TriMesh {
         balance.values().filter(|&&b| b != 0).count()
     }
 
+    /// For every vertex the smallest vertex of its connected piece. `alike(i)` names the vertex that `i` counts as: itself,
+    /// or the first one at the same place where a file gives every face corners of its own.
+    pub fn pieces(&self, alike: impl Fn(u32) -> u32) -> Vec<u32> {
+        let mut root: Vec<u32> = (0..self.vertices.len() as u32).map(&alike).collect();
+        fn find(root: &mut [u32], mut i: u32) -> u32 {
+            while root[i as usize] != i {
+                root[i as usize] = root[root[i as usize] as usize];
+                i = root[i as usize];
+            }
+            i
+        }
+        for &[a, b, c] in &self.faces {
+            for (x, y) in [(a, b), (b, c)] {
+                let (x, y) = (find(&mut root, x), find(&mut root, y));
+                root[x.max(y) as usize] = x.min(y);
+            }
+        }
+        (0..root.len() as u32).map(|i| find(&mut root, i)).collect()
+    }
+
     /// An axis-aligned box.
     pub fn cuboid(lo: Vec3, hi: Vec3) -> Self {
         let vertices = (0..8)

@@ -86,6 +86,12 @@ impl KinematicTree {
         self.joints.iter().find(|j| j.child == part)
     }
 
+    /// The joints (as indices) between `part` and its root, its own first. A cyclic (invalid) tree ends too.
+    pub fn ancestry(&self, part: usize) -> Vec<usize> {
+        let up = |part: usize| self.joints.iter().position(|j| j.child == part);
+        std::iter::successors(up(part), |&j| up(self.joints[j].parent)).take(self.parts.len()).collect()
+    }
+
     /// `world_from_canonical` of every part when joint `j` stands at `q[j]`: pose = parent's pose * screw motion.
     ///
     /// # Panics
@@ -95,16 +101,8 @@ impl KinematicTree {
     }
 
     fn pose(&self, part: usize, q: &[f64]) -> Pose {
-        // Walk up to the root; the counter keeps a cyclic (invalid) tree from hanging.
-        let (mut pose, mut at) = (Pose::IDENTITY, part);
-        for _ in 0..self.parts.len() {
-            let Some(i) = self.joints.iter().position(|j| j.child == at) else {
-                break;
-            };
-            pose = self.joints[i].screw.motion(q[i]) * pose;
-            at = self.joints[i].parent;
-        }
-        pose
+        let carried = |pose: Pose, j: usize| self.joints[j].screw.motion(q[j]) * pose;
+        self.ancestry(part).into_iter().fold(Pose::IDENTITY, carried)
     }
 
     /// The joint values of recording state `state`.

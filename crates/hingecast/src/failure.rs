@@ -1,6 +1,6 @@
 //! The error a person sees: what, where, what to try.
 
-use hingecast_geom::Cancelled;
+use hingecast_geom::{Cancelled, InputError};
 use std::path::Path;
 
 /// Three lines on stderr; exit code 2, or 130 when the person stopped it.
@@ -45,14 +45,8 @@ impl From<Cancelled> for Failure {
     }
 }
 
-impl From<hingecast_capture::CaptureError> for Failure {
-    fn from(e: hingecast_capture::CaptureError) -> Self {
-        if e.cancelled { Cancelled.into() } else { Self::new(e.what, e.place, e.hint) }
-    }
-}
-
-impl From<hingecast_policy::PolicyError> for Failure {
-    fn from(e: hingecast_policy::PolicyError) -> Self {
+impl From<InputError> for Failure {
+    fn from(e: InputError) -> Self {
         if e.cancelled { Cancelled.into() } else { Self::new(e.what, e.place, e.hint) }
     }
 }

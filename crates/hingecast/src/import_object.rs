@@ -5,10 +5,11 @@
 //! one base frame. Surfaces of such objects are open sheets in many shells: each shell that is small against its part (a handle,
 //! a knob) is decomposed by itself, where the voxels of the whole part would swallow it.
 
-use crate::failure::{Failure, Result};
+use crate::failure::Result;
 use glam::{DVec3, Vec3};
 use hingecast_capture::object::{ArticulatedObject, PartGeometry};
 use hingecast_capture::synth::useful_ranges;
+use hingecast_geom::folder::may_become;
 use hingecast_geom::{Progress, TriMesh};
 use hingecast_twin::hulls::{HullConfig, decompose};
 use hingecast_twin::{PartModel, Twin, mass};
@@ -49,16 +50,7 @@ pub struct Imported {
 /// # Errors
 /// When the source cannot be read, or `out` holds something else.
 pub fn import(source: &Path, out: &Path, config: &ImportConfig, progress: &Progress) -> Result<Imported> {
-    let holds_other = out.is_dir()
-        && !out.join("twin.json").is_file()
-        && std::fs::read_dir(out).map_err(Failure::io(out))?.next().is_some();
-    if holds_other {
-        return Err(Failure::new(
-            "the output folder holds something else",
-            out.display().to_string(),
-            "give a new folder",
-        ));
-    }
+    may_become("output folder", out, &["twin.json"], "give a new folder")?;
     let mut object = ArticulatedObject::load(source)?;
     let mut changes = Vec::new();
     // The ranges that `synth` plays: files let doors swing through their cabinets.
@@ -208,26 +200,11 @@ fn shells(mesh: &TriMesh) -> Vec<TriMesh> {
         .enumerate()
         .map(|(i, v)| *at.entry((*v + Vec3::ZERO).to_array().map(f32::to_bits)).or_insert(i as u32))
         .collect();
-    let mut root: Vec<u32> = (0..mesh.vertices.len() as u32).collect();
-    fn find(root: &mut [u32], mut i: u32) -> u32 {
-        while root[i as usize] != i {
-            root[i as usize] = root[root[i as usize] as usize];
-            i = root[i as usize];
-        }
-        i
-    }
-    for face in &mesh.faces {
-        let [a, b, c] = face.map(|i| same[i as usize]);
-        for (x, y) in [(a, b), (b, c)] {
-            let (x, y) = (find(&mut root, x), find(&mut root, y));
-            root[x.max(y) as usize] = x.min(y);
-        }
-    }
+    let piece = mesh.pieces(|i| same[i as usize]);
     // By the smallest vertex of each shell: the order does not depend on the hash.
     let mut faces: std::collections::BTreeMap<u32, Vec<[u32; 3]>> = std::collections::BTreeMap::new();
     for face in &mesh.faces {
-        let shell = find(&mut root, same[face[0] as usize]);
-        faces.entry(shell).or_default().push(face.map(|i| same[i as usize]));
+        faces.entry(piece[face[0] as usize]).or_default().push(face.map(|i| same[i as usize]));
     }
     faces
         .into_values()

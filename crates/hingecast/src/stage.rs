@@ -4,6 +4,7 @@
 //! the stage before, the format version). Same stamp: the stage is kept. So the same command resumes.
 
 use crate::failure::{Failure, Result};
+use hingecast_geom::folder::may_become;
 use hingecast_geom::ply::write_whole;
 use serde::{Deserialize, Serialize};
 use std::path::{Path, PathBuf};
@@ -51,20 +52,8 @@ impl RunFolder {
     /// Whether a build may write into `root`: it is new, empty, or a run. Stages empty their folders and `--fresh`
     /// the whole, so nothing of a person's may be in there.
     pub fn may_become_run(root: &Path) -> Result<()> {
-        let ours = ["run.json", "config.toml"].iter().any(|name| root.join(name).is_file());
-        let mut entries = match std::fs::read_dir(root) {
-            Ok(entries) => entries,
-            Err(e) if e.kind() == std::io::ErrorKind::NotFound => return Ok(()),
-            Err(e) => return Err(Failure::io(root)(e)),
-        };
-        if ours || entries.next().is_none() {
-            return Ok(());
-        }
-        Err(Failure::new(
-            "the run folder holds something else",
-            root.display().to_string(),
-            "give a new folder: hingecast build RECORDING -o RUN",
-        ))
+        let hint = "give a new folder: hingecast build RECORDING -o RUN";
+        Ok(may_become("run folder", root, &["run.json", "config.toml"], hint)?)
     }
 
     /// Opens a run, or starts one. A `run.json` that cannot be read starts anew.

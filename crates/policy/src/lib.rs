@@ -5,7 +5,6 @@
 
 mod actor;
 pub mod demos;
-mod error;
 pub mod net;
 mod policy;
 pub mod statistics;
@@ -13,7 +12,8 @@ pub mod train;
 
 pub use actor::Actor;
 pub use demos::{Demos, Episode};
-pub use error::PolicyError;
+/// What is wrong with demonstrations, settings or a policy.
+pub use hingecast_geom::InputError as PolicyError;
 pub use policy::{Normalization, ObsKey, Policy, PolicyConfig};
 
 /// Numbers of an action: three of translation, three of rotation (axis times angle), one of the gripper; each in [-1, 1].

@@ -12,6 +12,7 @@ use crate::task::{TABLE, TaskKind};
 use glam::{DMat3, DQuat, DVec3};
 use hingecast_geom::Pose;
 use hingecast_geom::pose::quat_from_rotation_vector;
+use hingecast_geom::random::normal;
 use mujoco_rs::prelude::*;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
@@ -375,11 +376,6 @@ fn arm_state(data: &MjData<Arc<MjModel>>, scene: &Scene) -> ArmState {
 /// Of a quaternion and its negative, the one nearer to `reference`.
 fn near(q: DQuat, reference: DQuat) -> DQuat {
     if q.dot(reference) < 0.0 { -q } else { q }
-}
-
-/// One draw from N(0, 1) (Box and Muller).
-pub(crate) fn normal(rng: &mut fastrand::Rng) -> f64 {
-    (-2.0 * (1.0 - rng.f64()).ln()).sqrt() * (2.0 * PI * rng.f64()).cos()
 }
 
 fn wxyz(q: DQuat) -> [f64; 4] {

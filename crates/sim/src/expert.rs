@@ -2,10 +2,11 @@
 //! the object in front of it, and has a person's imperfections: its own speed, approach and hover height in every episode, pauses,
 //! noise on every action, and a second try when the part slips.
 
-use crate::env::{ACTION, Env, normal};
+use crate::env::{ACTION, Env};
 use crate::task::TaskKind;
 use glam::{DQuat, DVec3};
 use hingecast_geom::pose::rotation_vector;
+use hingecast_geom::random::normal;
 use hingecast_geom::{JointKind, Pose, Screw};
 
 /// Steps of closing before the hand pulls.

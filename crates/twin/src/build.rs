@@ -76,15 +76,16 @@ pub fn build<E: From<Cancelled> + Send>(
 
     // Leaves first: what a drawer fills is not the cabinet's, where no ray can tell.
     let mut order: Vec<usize> = (0..tree.parts.len()).collect();
-    order.sort_by_key(|&p| std::cmp::Reverse(depth_of(tree, p)));
+    order.sort_by_key(|&p| std::cmp::Reverse(tree.ancestry(p).len()));
     let mut fields: Vec<Option<Field>> = (0..tree.parts.len()).map(|_| None).collect();
+    // A part also empties what it passes through between the states, in the parts that carry it.
+    let swept: Vec<Vec<Pose>> = poses.iter().cloned().chain(sweeps(tree, BETWEEN)).collect();
+    let carried = |part: usize, by: usize| tree.ancestry(part).iter().any(|&j| tree.joints[j].parent == by);
     for &part in &order {
         let Some(volume) = &volumes[part] else { continue };
-        // A part also empties what it passes through between the states, in the part that carries it.
-        let swept: Vec<Vec<Pose>> = poses.iter().cloned().chain(sweeps(tree, BETWEEN)).collect();
         let relative: Vec<(usize, Vec<Pose>)> = (0..fields.len())
             .filter(|&q| fields[q].is_some())
-            .map(|q| (q, if carries(tree, part, q) { &swept } else { &poses }))
+            .map(|q| (q, if carried(q, part) { &swept } else { &poses }))
             .map(|(q, path)| (q, path.iter().map(|at| at[q].inverse() * at[part]).collect()))
             .collect();
         let taken = |x: Vec3| {
@@ -174,18 +175,6 @@ const BETWEEN: usize = 120;
 /// Steps over a joint's range in which collision shapes are kept clear.
 const CLEARED: usize = 40;
 
-/// Whether `q` hangs on `part`, directly or through others.
-fn carries(tree: &KinematicTree, part: usize, mut q: usize) -> bool {
-    for _ in 0..tree.parts.len() {
-        match tree.joint_of(q) {
-            Some(joint) if joint.parent == part => return true,
-            Some(joint) => q = joint.parent,
-            None => return false,
-        }
-    }
-    false
-}
-
 /// Each joint in turn over its range in small steps, the others as in the first state. [pose][part]
 fn sweeps(tree: &KinematicTree, steps: usize) -> Vec<Vec<Pose>> {
     let Some(first) = tree.joints.iter().map(|j| j.values.first().copied()).collect::<Option<Vec<f64>>>() else {
@@ -200,18 +189,6 @@ fn sweeps(tree: &KinematicTree, steps: usize) -> Vec<Vec<Pose>> {
         }
     }
     out
-}
-
-/// Joints between `part` and its root.
-fn depth_of(tree: &KinematicTree, part: usize) -> usize {
-    let (mut depth, mut at) = (0, part);
-    while let Some(joint) = tree.joint_of(at) {
-        (depth, at) = (depth + 1, joint.parent);
-        if depth > tree.parts.len() {
-            break;
-        }
-    }
-    depth
 }
 
 fn colour<E: From<Cancelled> + Send>(

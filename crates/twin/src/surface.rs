@@ -85,30 +85,17 @@ pub fn extract(field: &Field) -> TriMesh {
 
 /// Keeps the connected pieces whose area is at least `fraction` of the largest's.
 pub fn drop_crumbs(mesh: &TriMesh, fraction: f64) -> TriMesh {
-    let mut root: Vec<u32> = (0..mesh.vertices.len() as u32).collect();
-    fn find(root: &mut [u32], mut i: u32) -> u32 {
-        while root[i as usize] != i {
-            root[i as usize] = root[root[i as usize] as usize];
-            i = root[i as usize];
-        }
-        i
-    }
-    for f in &mesh.faces {
-        for k in 1..3 {
-            let (a, b) = (find(&mut root, f[0]), find(&mut root, f[k]));
-            root[a.max(b) as usize] = a.min(b);
-        }
-    }
+    let piece = mesh.pieces(|i| i);
     let mut area = std::collections::BTreeMap::<u32, f64>::new();
     for f in &mesh.faces {
         let [a, b, c] = f.map(|i| mesh.vertices[i as usize]);
-        *area.entry(find(&mut root, f[0])).or_default() += 0.5 * (b - a).cross(c - a).length() as f64;
+        *area.entry(piece[f[0] as usize]).or_default() += 0.5 * (b - a).cross(c - a).length() as f64;
     }
     let largest = area.values().fold(0.0f64, |a, b| a.max(*b));
     let mut new_index = vec![u32::MAX; mesh.vertices.len()];
     let mut out = TriMesh::default();
     for f in &mesh.faces {
-        if area[&find(&mut root, f[0])] < fraction * largest {
+        if area[&piece[f[0] as usize]] < fraction * largest {
             continue;
         }
         out.faces.push(f.map(|i| {

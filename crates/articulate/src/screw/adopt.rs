@@ -31,7 +31,7 @@ pub fn adopt(evidence: &Evidence, tree: &mut KinematicTree, p: &Proposal, still:
     for gate in [1.5, 1.0, 0.7] {
         let mine = evidence.judge(&poses_of(tree, child, n_states));
         let mut members: Vec<Sample> = (0..evidence.samples.len())
-            .filter(|&i| mine[i].against == 0 && mine[i].support != 0 && still[i].against != 0)
+            .filter(|&i| mine[i].explains() && still[i].against != 0)
             .map(|i| evidence.samples[i])
             .collect();
         if members.len() < 20 {

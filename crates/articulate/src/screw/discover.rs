@@ -111,9 +111,8 @@ fn grow(evidence: &mut Evidence, node: &Node, width: usize, cost: f64, seed: u64
             let own = poses_of(&tree, tree.parts.len() - 1, n_states);
             let verdict = evidence.judge(&own);
             // What it explains now, not what proposed it: refining may have found another piece.
-            let explained = |i: &usize| verdict[*i].against == 0 && verdict[*i].support != 0;
             let explained: Vec<Sample> =
-                node.open.iter().filter(|i| explained(i)).map(|&i| evidence.samples[i]).collect();
+                node.open.iter().filter(|&&i| verdict[i].explains()).map(|&i| evidence.samples[i]).collect();
             let back: Vec<Motion> = poses[p.parent].iter().map(|p| p.inverse().into()).collect();
             let stride = explained.len().div_ceil(CROWD).max(1);
             let crowd: Vec<Sample> = explained.iter().step_by(stride).map(|s| s.moved(&back[s.state])).collect();

@@ -36,6 +36,11 @@ pub struct Sample {
 }
 
 impl Sample {
+    /// Point `i` of what `state` measured.
+    pub fn of(cloud: &Surface, state: usize, i: usize) -> Self {
+        Self { state, point: cloud.points[i], normal: cloud.normals[i] }
+    }
+
     pub fn moved(&self, m: &Motion) -> Self {
         Self { state: self.state, point: m.apply(self.point), normal: m.rot * self.normal }
     }
@@ -50,6 +55,13 @@ pub struct Verdict {
     pub fresh: u64,
     /// Support by surface that a known part could explain as well.
     pub possible: u64,
+}
+
+impl Verdict {
+    /// Nothing speaks against the motion, something for it.
+    pub fn explains(&self) -> bool {
+        self.against == 0 && self.support != 0
+    }
 }
 
 /// What is left of the base's contradictions when a part moves a sample to where nobody looked: that explains most of it,
@@ -114,8 +126,9 @@ impl Evidence {
                 let near = tree.k_nearest(*x, NEIGHBOURS + 1);
                 near.into_iter().skip(1).map(|j| first + j).collect::<Vec<u32>>()
             }));
-            samples.extend(order.iter().map(|&i| Sample { state, point: cloud.points[i], normal: cloud.normals[i] }));
-            clouds.push(Surface::new(cloud.points, cloud.normals));
+            let cloud = Surface::new(cloud.points, cloud.normals);
+            samples.extend(order.iter().map(|&i| Sample::of(&cloud, state, i)));
+            clouds.push(cloud);
         }
         let mut evidence = Self { lattice, clouds, spaces, samples, neighbours, tolerance: 0.2 * lattice.voxel };
         evidence.tolerance = evidence.tolerance.max(4.0 * evidence.noise());
@@ -243,7 +256,7 @@ impl Evidence {
                 let cloud = &self.clouds[state];
                 let mut out = [Vec::new(), Vec::new()];
                 for i in 0..cloud.points.len() {
-                    let s = Sample { state, point: cloud.points[i], normal: cloud.normals[i] };
+                    let s = Sample::of(cloud, state, i);
                     let verdicts = between.iter().map(|b| self.ask_all(&s, &b[state]));
                     let most = verdicts.filter(|v| v.against == 0).map(|v| v.support.count_ones() as usize).max();
                     match most {

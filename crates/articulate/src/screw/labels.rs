@@ -61,7 +61,7 @@ pub fn label_clouds(evidence: &Evidence, tree: &KinematicTree) -> Vec<Vec<u8>> {
     let verdicts: Vec<Vec<Verdict>> = (0..n_states)
         .map(|state| {
             let cloud = &evidence.clouds[state];
-            let ask = |k: usize| evidence.ask_all(&sample(cloud, state, k / n_parts), &between[k % n_parts][state]);
+            let ask = |k: usize| evidence.ask_all(&Sample::of(cloud, state, k / n_parts), &between[k % n_parts][state]);
             (0..cloud.points.len() * n_parts).into_par_iter().map(ask).collect()
         })
         .collect();
@@ -144,10 +144,6 @@ fn whole_patches(labels: &mut [u8], cloud: &Surface, near: &[Near], verdicts: &[
             patch.iter().for_each(|&i| labels[i] = owner as u8);
         }
     }
-}
-
-fn sample(cloud: &Surface, state: usize, i: usize) -> Sample {
-    Sample { state, point: cloud.points[i], normal: cloud.normals[i] }
 }
 
 /// Sum over the states in `support` of their belief in `part` where `x` comes to lie.

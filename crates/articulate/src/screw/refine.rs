@@ -118,7 +118,7 @@ pub fn refine(
         return report;
     }
     centre_pivots(tree, members);
-    let chains: Vec<Vec<usize>> = (0..tree.parts.len()).map(|p| chain(tree, p)).collect();
+    let chains: Vec<Vec<usize>> = (0..tree.parts.len()).map(|p| tree.ancestry(p)).collect();
     for round in 0..settings.rounds {
         let share = round as f64 / (settings.rounds - 1).max(1) as f64;
         let gate = settings.gates[0] * (settings.gates[1] / settings.gates[0]).powf(share);
@@ -265,19 +265,6 @@ fn update(tree: &mut KinematicTree, slots: &[Option<Slot>], step: &DVector<f64>)
             *q += step[slot.values + s - 1];
         }
     }
-}
-
-/// Joints between a part and the root.
-fn chain(tree: &KinematicTree, part: usize) -> Vec<usize> {
-    let (mut at, mut out) = (part, Vec::new());
-    while let Some(j) = tree.joints.iter().position(|j| j.child == at) {
-        out.push(j);
-        at = tree.joints[j].parent;
-        if out.len() > tree.joints.len() {
-            break;
-        }
-    }
-    out
 }
 
 /// Pivots slide along their axes to beside their part: far from it, tilt and shift would be hard to tell apart.

@@ -1,9 +1,9 @@
 //! Single images in and out: colour, mask, depth. Errors name the file.
 
 use crate::CaptureError;
+use hingecast_geom::ply::write_whole;
 use image::codecs::png::{CompressionType, FilterType, PngEncoder};
 use image::{DynamicImage, ExtendedColorType, ImageEncoder};
-use std::io::Write;
 use std::path::Path;
 
 /// Decodes an image file.
@@ -111,12 +111,5 @@ fn write_png(path: &Path, bytes: &[u8], w: usize, h: usize, color: ExtendedColor
 
 /// Writes a file to a temporary name beside it and renames: readers never see half a file.
 pub fn write_file(path: &Path, bytes: &[u8]) -> Result<(), CaptureError> {
-    let mut name = path.file_name().unwrap_or_default().to_os_string();
-    name.push(".part");
-    let part = path.with_file_name(name);
-    let write = || {
-        std::fs::File::create(&part)?.write_all(bytes)?;
-        std::fs::rename(&part, path)
-    };
-    write().map_err(|e| CaptureError::write(path, e))
+    write_whole(path, bytes).map_err(|e| CaptureError::write(path, e))
 }

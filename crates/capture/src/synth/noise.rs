@@ -7,6 +7,7 @@
 
 use super::output::Exposure;
 use glam::{DQuat, DVec3};
+use hingecast_geom::random::normal;
 use hingecast_geom::{Camera, Pose};
 
 /// Focal length at 1280 x 720 [px] times baseline [m].
@@ -47,7 +48,7 @@ fn depth(e: &mut Exposure, camera: &Camera, metres_per_unit: f64, rng: &mut fast
             let i = y * w + x;
             let z = exact[i];
             // Drawn for every pixel, so that one hole does not shift the noise of the rest.
-            let (noise, luck) = (gauss(rng), rng.f64());
+            let (noise, luck) = (normal(rng), rng.f64());
             if z == 0.0 {
                 continue;
             }
@@ -78,12 +79,12 @@ fn depth(e: &mut Exposure, camera: &Camera, metres_per_unit: f64, rng: &mut fast
 }
 
 fn color(e: &mut Exposure, rng: &mut fastrand::Rng) {
-    let exposure = (EXPOSURE * gauss(rng)).exp();
-    let gain = [0; 3].map(|_| exposure * (WHITE_BALANCE * gauss(rng)).exp());
+    let exposure = (EXPOSURE * normal(rng)).exp();
+    let gain = [0; 3].map(|_| exposure * (WHITE_BALANCE * normal(rng)).exp());
     for (i, value) in e.rgb.iter_mut().enumerate() {
         let exact = f64::from(*value) * gain[i % 3];
         let std = (READ_NOISE.powi(2) + SHOT_NOISE.powi(2) * exact / 255.0).sqrt();
-        *value = (exact + std * gauss(rng)).round().clamp(0.0, 255.0) as u8;
+        *value = (exact + std * normal(rng)).round().clamp(0.0, 255.0) as u8;
     }
 }
 
@@ -105,15 +106,10 @@ fn mask(e: &mut Exposure, w: usize, h: usize, rng: &mut fastrand::Rng) {
 /// Root mean square over the three axes together: 0.5 deg and 3 mm.
 fn pose(camera: &mut Camera, metres_per_unit: f64, rng: &mut fastrand::Rng) {
     let per_axis = 1.0 / 3f64.sqrt();
-    let mut vector = |std: f64| DVec3::new(gauss(rng), gauss(rng), gauss(rng)) * (std * per_axis);
+    let mut vector = |std: f64| DVec3::new(normal(rng), normal(rng), normal(rng)) * (std * per_axis);
     let (turn, shift) = (vector(POSE_DEG.to_radians()), vector(POSE_METRES / metres_per_unit));
     // In the camera's own frame: turning about the camera, not about the world's origin.
     camera.camera_from_world = Pose::new(DQuat::from_scaled_axis(turn), shift) * camera.camera_from_world;
-}
-
-/// Standard normal, by Box and Muller.
-fn gauss(rng: &mut fastrand::Rng) -> f64 {
-    (-2.0 * (1.0 - rng.f64()).ln()).sqrt() * (std::f64::consts::TAU * rng.f64()).cos()
 }
 
 /// Noise of unit variance at its nodes, bilinear between them.
@@ -127,7 +123,7 @@ impl Smooth {
     fn new(w: usize, h: usize, cell: f64, rng: &mut fastrand::Rng) -> Self {
         let columns = (w as f64 / cell) as usize + 2;
         let rows = (h as f64 / cell) as usize + 2;
-        Self { nodes: (0..columns * rows).map(|_| gauss(rng)).collect(), columns, cell }
+        Self { nodes: (0..columns * rows).map(|_| normal(rng)).collect(), columns, cell }
     }
 
     fn at(&self, x: usize, y: usize) -> f64 {

@@ -1,6 +1,7 @@
 //! Folders that appear whole or not at all.
 
 use crate::CaptureError;
+use hingecast_geom::folder::may_become;
 use std::path::{Path, PathBuf};
 
 /// A folder that is filled under a temporary name and takes its place when all is there.
@@ -12,15 +13,8 @@ impl Staging {
     /// # Errors
     /// When `target` holds something that is no recording: nothing of a person's is ever removed.
     pub fn new(target: &Path) -> Result<Self, CaptureError> {
-        let ours = |name: &str| target.join(name).is_file();
-        let empty = std::fs::read_dir(target).map(|mut d| d.next().is_none()).unwrap_or(true);
-        if target.exists() && !empty && !ours("transforms.json") && !ours("truth.json") {
-            return Err(CaptureError::new(
-                "the output folder holds something else",
-                target.display().to_string(),
-                "give a new folder, or empty this one yourself",
-            ));
-        }
+        let hint = "give a new folder, or empty this one yourself";
+        may_become("output folder", target, &["transforms.json", "truth.json"], hint)?;
         let mut name = target.file_name().unwrap_or_default().to_os_string();
         name.push(".part");
         let path = target.with_file_name(name);

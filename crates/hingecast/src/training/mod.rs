@@ -6,6 +6,7 @@ pub mod sweep;
 use crate::config::{Words, layered};
 use crate::failure::{Failure, Result};
 use hingecast_geom::Progress;
+use hingecast_geom::folder::may_become;
 use hingecast_geom::ply::write_whole;
 use hingecast_policy::Demos;
 use hingecast_policy::train::{Preset, TrainConfig, TrainReport};
@@ -28,17 +29,8 @@ pub fn resolve(preset: Preset, file: Option<&Path>, set: &[String]) -> Result<Tr
 /// # Errors
 /// The folder holds something else.
 pub fn may_become_policy(folder: &Path) -> Result<()> {
-    let ours = ["train.toml", "policy.json", "sweep.json"].iter().any(|name| folder.join(name).is_file());
-    let mut entries = match std::fs::read_dir(folder) {
-        Ok(entries) => entries,
-        Err(e) if e.kind() == std::io::ErrorKind::NotFound => return Ok(()),
-        Err(e) => return Err(Failure::io(folder)(e)),
-    };
-    if ours || entries.next().is_none() {
-        return Ok(());
-    }
     let hint = "give a new folder: hingecast train DEMOS.hdf5 -o POLICY";
-    Err(Failure::new("the policy folder holds something else", folder.display().to_string(), hint))
+    Ok(may_become("policy folder", folder, &["train.toml", "policy.json", "sweep.json"], hint)?)
 }
 
 /// Trains into `folder`, or goes on there: `train.toml`, `env_args.json`, the policy, `loss.svg`.

@@ -12,6 +12,7 @@
 use super::math::{sigmoid, softplus, tanh};
 use super::{Head, NetConfig};
 use crate::ACTION_SIZE;
+use hingecast_geom::random::normal;
 
 /// Standard deviation of an action in a rollout (robomimic's low_noise_eval), units of the action.
 pub const EVAL_STD: f64 = 1e-4;
@@ -138,12 +139,6 @@ pub fn sample(config: &NetConfig, outputs: &[Vec<f32>], rng: &mut fastrand::Rng)
     // Rounding may leave a crumb after the last mode.
     let mode = mode.unwrap_or(logits.len() - 1);
     std::array::from_fn(|d| f64::from(tanh(outputs[0][mode * ACTION_SIZE + d])) + EVAL_STD * normal(rng))
-}
-
-/// A standard normal number (Box and Muller 1958).
-fn normal(rng: &mut fastrand::Rng) -> f64 {
-    let radius = (-2.0 * (1.0 - rng.f64()).ln()).sqrt();
-    radius * (std::f64::consts::TAU * rng.f64()).cos()
 }
 
 #[cfg(test)]

@@ -116,7 +116,10 @@ pub fn train(
         if stopped.is_err() || last || step.is_multiple_of(config.checkpoint_every) {
             state.save(&net, &stamp, &path)?;
         }
-        stopped?;
+        stopped.map_err(|c| PolicyError {
+            hint: "run the same command again: it goes on from the last checkpoint".into(),
+            ..c.into()
+        })?;
     }
     if state.parameters.iter().any(|p| !p.is_finite()) {
         return Err(diverged(config.steps, config));
