@@ -166,9 +166,11 @@ pub fn merge(planes: impl Iterator<Item = (Vec3, Vec3)>, voxel: f32, least: u32)
         slot.1 += n.as_dvec3();
         slot.2 += 1;
     }
-    // The table's order is not the same in every run.
+    // The table's order is not the same in every run. Along Morton's curve, what is asked one after the other lies close together
+    // in every state's grid and tree.
+    let lowest = cells.keys().fold(IVec3::MAX, |lo, k| lo.min(k.0.into()));
     let mut cells: Vec<_> = cells.into_iter().collect();
-    cells.sort_unstable_by_key(|c| c.0);
+    cells.sort_by_cached_key(|c| (morton(IVec3::from(c.0.0) - lowest), c.0.1));
     let mut cloud = Cloud::default();
     for (_, (x, n, count)) in cells {
         let mean = n / count as f64;
@@ -179,6 +181,12 @@ pub fn merge(planes: impl Iterator<Item = (Vec3, Vec3)>, voxel: f32, least: u32)
         }
     }
     cloud
+}
+
+/// Place on Morton's curve: the bits of x, y and z in turns. Coordinates are not negative.
+fn morton(c: IVec3) -> u64 {
+    let spread = |v: i32| (0..21).fold(0u64, |sum, bit| sum | (v as u64 >> bit & 1) << (3 * bit));
+    spread(c.x) | spread(c.y) << 1 | spread(c.z) << 2
 }
 
 /// Which of the six faces of a cube a direction goes through.

@@ -10,6 +10,8 @@ pub struct Lattice {
     pub lo: Vec3,
     pub voxel: f32,
     pub size: IVec3,
+    /// 1 / voxel.
+    per_voxel: f32,
 }
 
 impl Lattice {
@@ -17,7 +19,7 @@ impl Lattice {
     pub fn new(lo: Vec3, hi: Vec3, cells: usize) -> Self {
         let voxel = (hi - lo).max_element() / cells as f32;
         let size = ((hi - lo) / voxel).ceil().as_ivec3() + IVec3::splat(7);
-        Self { lo: lo - Vec3::splat(3.0 * voxel), voxel, size }
+        Self { lo: lo - Vec3::splat(3.0 * voxel), voxel, size, per_voxel: 1.0 / voxel }
     }
 
     pub fn len(&self) -> usize {
@@ -29,7 +31,7 @@ impl Lattice {
     }
 
     fn cell(&self, x: Vec3) -> IVec3 {
-        ((x - self.lo) / self.voxel).floor().as_ivec3()
+        ((x - self.lo) * self.per_voxel).floor().as_ivec3()
     }
 
     fn index_of(&self, c: IVec3) -> Option<usize> {
@@ -37,10 +39,14 @@ impl Lattice {
         inside.then(|| ((c.z * self.size.y + c.y) * self.size.x + c.x) as usize)
     }
 
-    /// Index of the cell that holds `x`.
+    /// Index of the cell that holds `x`. Asked hundreds of millions of times, so it rounds by cutting off decimals: what is inside
+    /// is not negative.
     #[inline]
     pub fn index(&self, x: Vec3) -> Option<usize> {
-        self.index_of(self.cell(x))
+        let t = (x - self.lo) * self.per_voxel;
+        let inside = t.cmpge(Vec3::ZERO).all() && t.cmplt(self.size.as_vec3()).all();
+        let c = t.as_ivec3();
+        inside.then(|| ((c.z * self.size.y + c.y) * self.size.x + c.x) as usize)
     }
 
     /// Calls `visit` with the index of the cell that holds `x` and of the 26 around it.
