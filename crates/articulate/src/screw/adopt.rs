@@ -7,6 +7,9 @@ use super::refine::{self, refine};
 use super::scan::{agreement, scan, whole_range};
 use hingecast_geom::{Joint, KinematicTree, Pose};
 
+/// Most samples that a new joint is refined with; all of them refine the finished tree.
+const MEMBERS: usize = 6000;
+
 /// Adds the proposal to the tree as a part; its screw and values are refined and asked again in turns, first with the
 /// source samples, then with everything that moves with it.
 /// `still`: the verdicts on all samples if they moved with the parent.
@@ -28,22 +31,20 @@ pub fn adopt(evidence: &Evidence, tree: &mut KinematicTree, p: &Proposal, still:
         polish(evidence, tree, &crowd, gate * voxel, n_states, seed);
         rescan(evidence, tree, &crowd, &place);
     }
+    let moving: Vec<usize> = (0..still.len()).filter(|&i| still[i].against != 0).collect();
     for gate in [1.5, 1.0, 0.7] {
-        let mine = evidence.judge(&poses_of(tree, child, n_states));
-        let mut members: Vec<Sample> = (0..evidence.samples.len())
-            .filter(|&i| mine[i].explains() && still[i].against != 0)
-            .map(|i| evidence.samples[i])
-            .collect();
+        let mine = evidence.judge_some(&poses_of(tree, child, n_states), &moving);
+        let explained = moving.iter().zip(&mine).filter(|(_, v)| v.explains());
+        let mut members: Vec<Sample> = explained.map(|(&i, _)| evidence.samples[i]).collect();
         if members.len() < 20 {
             break;
         }
-        polish(evidence, tree, &members, gate * voxel, 4, seed);
-        let all = members.clone();
         fastrand::Rng::with_seed(seed).shuffle(&mut members);
-        members.truncate(2 * CROWD);
-        rescan(evidence, tree, &members, &place);
+        members.truncate(MEMBERS);
+        polish(evidence, tree, &members, gate * voxel, 4, seed);
+        rescan(evidence, tree, &members[..members.len().min(2 * CROWD)], &place);
         // Asking answers in steps of the grid.
-        polish(evidence, tree, &all, gate * voxel, 4, seed);
+        polish(evidence, tree, &members, gate * voxel, 4, seed);
     }
 }
 

@@ -109,17 +109,17 @@ fn grow(evidence: &mut Evidence, node: &Node, width: usize, cost: f64, seed: u64
             let mut tree = node.tree.clone();
             adopt(evidence, &mut tree, p, &node.verdicts[p.parent], seed);
             let own = poses_of(&tree, tree.parts.len() - 1, n_states);
-            let verdict = evidence.judge(&own);
             // What it explains now, not what proposed it: refining may have found another piece.
-            let explained: Vec<Sample> =
-                node.open.iter().filter(|&&i| verdict[i].explains()).map(|&i| evidence.samples[i]).collect();
+            let verdicts = evidence.judge_some(&own, &node.open);
+            let explained = node.open.iter().zip(&verdicts).filter(|(_, v)| v.explains());
+            let explained: Vec<Sample> = explained.map(|(&i, _)| evidence.samples[i]).collect();
             let back: Vec<Motion> = poses[p.parent].iter().map(|p| p.inverse().into()).collect();
             let stride = explained.len().div_ceil(CROWD).max(1);
             let crowd: Vec<Sample> = explained.iter().step_by(stride).map(|s| s.moved(&back[s.state])).collect();
             let joint = tree.joints.last().expect("a part was added");
             let weight = plausibility(&joint.screw, &joint.values, joint.parent, &crowd, evidence.extent());
             let merit = jury.gain(evidence, &own, true) * weight - cost;
-            Final { merit, tree, verdict, explained: explained.len() }
+            Final { merit, tree, explained: explained.len() }
         })
         .collect();
     finals.sort_by(|a, b| b.merit.total_cmp(&a.merit));
@@ -129,7 +129,7 @@ fn grow(evidence: &mut Evidence, node: &Node, width: usize, cost: f64, seed: u64
         .take(width)
         .map(|f| {
             let mut verdicts = node.verdicts.clone();
-            verdicts.push(f.verdict);
+            verdicts.push(evidence.judge(&poses_of(&f.tree, f.tree.parts.len() - 1, n_states)));
             let open = open_samples(&verdicts);
             Node { tree: f.tree, verdicts, open, merit: node.merit + f.merit }
         })
@@ -140,7 +140,6 @@ fn grow(evidence: &mut Evidence, node: &Node, width: usize, cost: f64, seed: u64
 struct Final {
     merit: f64,
     tree: KinematicTree,
-    verdict: Vec<Verdict>,
     /// Open samples that it explains.
     explained: usize,
 }

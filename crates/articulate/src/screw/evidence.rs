@@ -211,24 +211,38 @@ impl Evidence {
     pub fn judge(&self, poses: &[Pose]) -> Vec<Verdict> {
         let between = self.between(poses);
         let raw: Vec<Verdict> = self.samples.par_iter().map(|s| self.ask_all(s, &between[s.state])).collect();
-        // Lone contradictions are noise.
-        (0..raw.len())
-            .into_par_iter()
-            .map(|i| {
-                let mut v = raw[i];
-                let mut bits = v.against;
-                while bits != 0 {
-                    let t = bits.trailing_zeros();
-                    bits &= bits - 1;
-                    let near = &self.neighbours[i];
-                    let agree = near.iter().filter(|&&j| raw[j as usize].against >> t & 1 == 1).count();
-                    if 2 * agree < near.len() {
-                        v.against &= !(1 << t);
-                    }
-                }
-                v
-            })
-            .collect()
+        (0..raw.len()).into_par_iter().map(|i| self.without_lone(&raw, i)).collect()
+    }
+
+    /// The same for some samples alone.
+    pub fn judge_some(&self, poses: &[Pose], which: &[usize]) -> Vec<Verdict> {
+        let between = self.between(poses);
+        let mut needed = vec![false; self.samples.len()];
+        for &i in which {
+            needed[i] = true;
+            self.neighbours[i].iter().for_each(|&j| needed[j as usize] = true);
+        }
+        let ask = |(s, needed): (&Sample, &bool)| {
+            if *needed { self.ask_all(s, &between[s.state]) } else { Verdict::default() }
+        };
+        let raw: Vec<Verdict> = self.samples.par_iter().zip(&needed).map(ask).collect();
+        which.par_iter().map(|&i| self.without_lone(&raw, i)).collect()
+    }
+
+    /// The verdict on sample `i` without contradictions that most of its neighbours do not share: these are noise.
+    fn without_lone(&self, raw: &[Verdict], i: usize) -> Verdict {
+        let mut v = raw[i];
+        let mut bits = v.against;
+        while bits != 0 {
+            let t = bits.trailing_zeros();
+            bits &= bits - 1;
+            let near = &self.neighbours[i];
+            let agree = near.iter().filter(|&&j| raw[j as usize].against >> t & 1 == 1).count();
+            if 2 * agree < near.len() {
+                v.against &= !(1 << t);
+            }
+        }
+        v
     }
 
     /// Moves what each state measured (its samples; the grid is too coarse to care).
