@@ -24,6 +24,23 @@ const MIN_EMPTY: u16 = 2;
 const SHEET_HITS: u32 = 4;
 const SHEET_VALUE: f32 = 0.25;
 
+/// Normals of faces, edges and corners of a cube, one of each pair.
+const SLABS: [[i32; 3]; 13] = [
+    [1, 0, 0],
+    [0, 1, 0],
+    [0, 0, 1],
+    [1, 1, 0],
+    [1, -1, 0],
+    [1, 0, 1],
+    [1, 0, -1],
+    [0, 1, 1],
+    [0, 1, -1],
+    [1, 1, 1],
+    [1, 1, -1],
+    [1, -1, 1],
+    [-1, 1, 1],
+];
+
 type Key = [i32; 3];
 
 /// Blocks near the surface of one part, with the running average in them.
@@ -155,7 +172,7 @@ impl PartVolume {
 
     /// The dense field. `taken(x)` says that canonical point `x` is inside a part that is already built:
     /// space that no ray reached is then not this part's. With `enclosed`, unreached space is solid only where the
-    /// part's own surface encloses it; without (the root, whose underside no camera sees) everywhere.
+    /// part's own surface encloses it; without (the root, whose underside no camera sees) wherever it is not beyond all that was seen.
     pub fn field(&self, taken: &(dyn Fn(Vec3) -> bool + Sync), enclosed: bool) -> Field {
         // One voxel of empty border on each side closes the surface.
         let n = |a: usize| ((self.hi[a] - self.lo[a] + 1) * B) as usize + 2;
@@ -189,6 +206,8 @@ impl PartVolume {
         self.keep_sheets(&mut field);
         if enclosed {
             field.open_unreached();
+        } else {
+            field.open_beyond_seen();
         }
         field.values.par_iter_mut().enumerate().for_each(|(i, value)| {
             if !field.known[i] {
@@ -250,6 +269,31 @@ fn count_hits(blocks: &[Block], seen: &Observation, world_from_canonical: &Pose,
 }
 
 impl Field {
+    /// Empties unknown space beyond the seen surface: outside the slabs, in [`SLABS`] directions, that just hold all solid voxels
+    /// that a ray reached. Below the walls of a cabinet whose underside nobody saw there is no cabinet.
+    fn open_beyond_seen(&mut self) {
+        let [nx, ny, _] = self.dims;
+        let place = |i: usize| Vec3::new((i % nx) as f32, (i / nx % ny) as f32, (i / (nx * ny)) as f32);
+        let solid: Vec<Vec3> =
+            (0..self.values.len()).filter(|&i| self.known[i] && self.values[i] < 0.0).map(place).collect();
+        let slabs: Vec<(Vec3, f32, f32)> = SLABS
+            .iter()
+            .map(|d| {
+                let d = Vec3::from(d.map(|v| v as f32));
+                let (lo, hi) =
+                    solid.iter().map(|x| d.dot(*x)).fold((f32::MAX, f32::MIN), |(lo, hi), h| (lo.min(h), hi.max(h)));
+                (d, lo, hi)
+            })
+            .collect();
+        let beyond = |x: Vec3| slabs.iter().any(|(d, lo, hi)| !(*lo..=*hi).contains(&d.dot(x)));
+        let known = &self.known;
+        self.values
+            .par_iter_mut()
+            .enumerate()
+            .filter(|(i, _)| !known[*i] && beyond(place(*i)))
+            .for_each(|(_, v)| *v = 1.0);
+    }
+
     /// Empties unknown space that connects to the grid's border without crossing the surface.
     fn open_unreached(&mut self) {
         let [nx, ny, nz] = self.dims;

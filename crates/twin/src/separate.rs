@@ -1,8 +1,9 @@
 //! Convex pieces of different parts that still overlap in a recorded state, cut apart.
 //!
 //! A convex piece reaches a little beyond the surface that it stands for. Where a piece of a moving part overlaps
-//! one of a part nearer to the root, it is cut along the plane that separates them most cheaply (the minimal
-//! translation of GJK/EPA): its far side stays. What loses nearly everything is dropped.
+//! one of a part nearer to the root, it is cut along a plane that supports the still piece: of those along its faces and
+//! that of the minimal translation (GJK/EPA) the one that leaves the most. (The minimal translation alone cuts a thin lid
+//! through its thickness where its rim sinks in.) What loses nearly everything is dropped.
 
 use glam::{Mat3, Vec3};
 use hingecast_geom::{Pose, TriMesh};
@@ -14,16 +15,36 @@ use rayon::prelude::*;
 /// A piece cut below this share of its volume is dropped.
 const LEAST_LEFT: f64 = 0.15;
 
+/// Faces of a still piece whose normals differ by less are tried once.
+const SAME_FACE: f32 = 0.97;
+
 struct Piece {
     shape: ConvexPolyhedron,
     lo: Vec3,
     hi: Vec3,
+    /// Outward, of faces that differ.
+    normals: Vec<Vec3>,
+}
+
+impl Piece {
+    /// How far the piece reaches along `n`.
+    fn support(&self, n: Vec3) -> f32 {
+        self.shape.points().iter().map(|p| n.dot(Vec3::new(p.x, p.y, p.z))).fold(f32::MIN, f32::max)
+    }
 }
 
 fn piece(hull: &TriMesh) -> Option<Piece> {
     let points: Vec<Vector> = hull.vertices.iter().map(|v| Vector::new(v.x, v.y, v.z)).collect();
     let (lo, hi) = hull.bounds()?;
-    Some(Piece { shape: ConvexPolyhedron::from_convex_hull(&points)?, lo, hi })
+    let mut normals: Vec<Vec3> = Vec::new();
+    for f in &hull.faces {
+        let [a, b, c] = f.map(|i| hull.vertices[i as usize]);
+        let n = (b - a).cross(c - a).normalize_or_zero();
+        if n != Vec3::ZERO && normals.iter().all(|o| o.dot(n) < SAME_FACE) {
+            normals.push(n);
+        }
+    }
+    Some(Piece { shape: ConvexPolyhedron::from_convex_hull(&points)?, lo, hi, normals })
 }
 
 /// Cuts `hulls[part]` for all parts in `order` (root first) clear of the parts before it, in all states.
@@ -61,14 +82,18 @@ fn clear_of(hull: &TriMesh, still: &[Piece], motions: &[Pose], clearance: f32) -
             }
             let found = query::contact(&ParryPose::IDENTITY, &other.shape, &place, &moving.shape, 0.5 * clearance);
             let Ok(Some(contact)) = found else { continue };
-            // The supporting plane of the still piece, in the moving part's frame.
-            let normal = Vec3::new(contact.normal1.x, contact.normal1.y, contact.normal1.z);
-            let point = Vec3::new(contact.point1.x, contact.point1.y, contact.point1.z) + clearance * normal;
-            let (normal, point) = (rot.transpose() * normal, rot.transpose() * (point - trans));
-            hull = clip(&hull, normal, normal.dot(point))?;
-            if !(hull.mass_integrals().volume > LEAST_LEFT * whole) {
+            let nearest = Vec3::new(contact.normal1.x, contact.normal1.y, contact.normal1.z);
+            // Supporting planes of the still piece, in the moving part's frame.
+            let left = std::iter::once(nearest).chain(other.normals.iter().copied()).filter_map(|n| {
+                let offset = other.support(n) + clearance - n.dot(trans);
+                let cut = clip(&hull, rot.transpose() * n, offset)?;
+                Some((cut.mass_integrals().volume, cut))
+            });
+            let (volume, most) = left.max_by(|a, b| a.0.total_cmp(&b.0))?;
+            if !(volume > LEAST_LEFT * whole) {
                 return None;
             }
+            hull = most;
             moving = piece(&hull)?;
         }
     }
