@@ -1,6 +1,7 @@
 //! The stage: observations and tree in, [`Twin`] out.
 
 use crate::fuse::{self, Field};
+use crate::slabs::Slabs;
 use crate::{Inertial, Observation, PartModel, Twin, clearance, color, hulls, mass, separate, simplify, surface};
 use glam::{DMat3, DVec3, Vec3};
 use hingecast_geom::{Cancelled, KinematicTree, Pose, Progress, TriMesh};
@@ -77,7 +78,7 @@ pub fn build<E: From<Cancelled> + Send>(
     // Leaves first: what a drawer fills is not the cabinet's, where no ray can tell.
     let mut order: Vec<usize> = (0..tree.parts.len()).collect();
     order.sort_by_key(|&p| std::cmp::Reverse(tree.ancestry(p).len()));
-    let mut fields: Vec<Option<Field>> = (0..tree.parts.len()).map(|_| None).collect();
+    let mut fields: Vec<Option<(Field, Slabs)>> = (0..tree.parts.len()).map(|_| None).collect();
     // A part also empties what it passes through between the states, in the parts that carry it.
     let swept: Vec<Vec<Pose>> = poses.iter().cloned().chain(sweeps(tree, BETWEEN)).collect();
     let carried = |part: usize, by: usize| tree.ancestry(part).iter().any(|&j| tree.joints[j].parent == by);
@@ -88,15 +89,21 @@ pub fn build<E: From<Cancelled> + Send>(
             .map(|q| (q, if carried(q, part) { &swept } else { &poses }))
             .map(|(q, path)| (q, path.iter().map(|at| at[q].inverse() * at[part]).collect()))
             .collect();
-        let taken = |x: Vec3| {
+        // Far from what is seen of this part, the hollow of the other is empty as well: nothing of a cabinet is in its drawer.
+        let taken = |x: Vec3, deep: bool| {
             relative.iter().any(|(q, q_from_part)| {
-                let field = fields[*q].as_ref().expect("filtered");
-                q_from_part.iter().any(|pose| field.at(pose.apply(x.as_dvec3()).as_vec3()) < 0.0)
+                let (field, hull) = fields[*q].as_ref().expect("filtered");
+                q_from_part.iter().any(|pose| {
+                    let x = pose.apply(x.as_dvec3()).as_vec3();
+                    field.at(x) < 0.0 || deep && hull.hold(x)
+                })
             })
         };
         let field = volume.field(&taken, tree.joint_of(part).is_some());
-        fields[part] = Some(field);
+        let hull = field.hull();
+        fields[part] = Some((field, hull));
     }
+    let fields: Vec<Option<Field>> = fields.into_iter().map(|f| Some(f?.0)).collect();
     progress.check()?;
 
     let mut doubts = Vec::new();

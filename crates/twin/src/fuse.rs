@@ -5,6 +5,7 @@
 //! is empty; a background pixel empties its whole ray; and what no ray ever reached counts as solid, so that
 //! closed things come out closed and have a volume. Units: scene units; frame: canonical world.
 
+use crate::slabs::Slabs;
 use crate::{BACKGROUND, Observation, UNKNOWN};
 use glam::Vec3;
 use hingecast_geom::{Cancelled, Pose};
@@ -24,22 +25,8 @@ const MIN_EMPTY: u16 = 2;
 const SHEET_HITS: u32 = 4;
 const SHEET_VALUE: f32 = 0.25;
 
-/// Normals of faces, edges and corners of a cube, one of each pair.
-const SLABS: [[i32; 3]; 13] = [
-    [1, 0, 0],
-    [0, 1, 0],
-    [0, 0, 1],
-    [1, 1, 0],
-    [1, -1, 0],
-    [1, 0, 1],
-    [1, 0, -1],
-    [0, 1, 1],
-    [0, 1, -1],
-    [1, 1, 1],
-    [1, 1, -1],
-    [1, -1, 1],
-    [-1, 1, 1],
-];
+/// Voxels from the surface beyond which unseen space is nobody's shell.
+const SHELL: usize = 4;
 
 type Key = [i32; 3];
 
@@ -170,10 +157,10 @@ impl PartVolume {
         });
     }
 
-    /// The dense field. `taken(x)` says that canonical point `x` is inside a part that is already built:
-    /// space that no ray reached is then not this part's. With `enclosed`, unreached space is solid only where the
+    /// The dense field. `taken(x, deep)` says that canonical point `x` is another part's room: space that no ray reached is
+    /// then not this part's; `deep`: it is far from all seen surface of this part. With `enclosed`, unreached space is solid only where the
     /// part's own surface encloses it; without (the root, whose underside no camera sees) wherever it is not beyond all that was seen.
-    pub fn field(&self, taken: &(dyn Fn(Vec3) -> bool + Sync), enclosed: bool) -> Field {
+    pub fn field(&self, taken: &(dyn Fn(Vec3, bool) -> bool + Sync), enclosed: bool) -> Field {
         // One voxel of empty border on each side closes the surface.
         let n = |a: usize| ((self.hi[a] - self.lo[a] + 1) * B) as usize + 2;
         let dims = [n(2), n(1), n(0)];
@@ -202,21 +189,18 @@ impl PartVolume {
         for (key, empty) in &self.hollow {
             fill(key, &|_| if *empty >= MIN_EMPTY { Some(1.0) } else { None });
         }
-        let (origin, voxel) = (field.origin, field.voxel);
         self.keep_sheets(&mut field);
         if enclosed {
             field.open_unreached();
         } else {
             field.open_beyond_seen();
         }
-        field.values.par_iter_mut().enumerate().for_each(|(i, value)| {
-            if !field.known[i] {
-                let (x, y, z) = (i % dims[0], i / dims[0] % dims[1], i / (dims[0] * dims[1]));
-                if taken(origin + Vec3::new(x as f32, y as f32, z as f32) * voxel) {
-                    *value = 1.0;
-                }
-            }
-        });
+        let shell = field.shell();
+        let open: Vec<usize> = (0..total)
+            .into_par_iter()
+            .filter(|&i| !field.known[i] && field.values[i] < 0.0 && taken(field.place(i), !shell[i]))
+            .collect();
+        open.into_iter().for_each(|i| field.values[i] = 1.0);
         field
     }
 
@@ -269,29 +253,44 @@ fn count_hits(blocks: &[Block], seen: &Observation, world_from_canonical: &Pose,
 }
 
 impl Field {
-    /// Empties unknown space beyond the seen surface: outside the slabs, in [`SLABS`] directions, that just hold all solid voxels
-    /// that a ray reached. Below the walls of a cabinet whose underside nobody saw there is no cabinet.
-    fn open_beyond_seen(&mut self) {
+    /// Where voxel `i` is.
+    fn place(&self, i: usize) -> Vec3 {
         let [nx, ny, _] = self.dims;
-        let place = |i: usize| Vec3::new((i % nx) as f32, (i / nx % ny) as f32, (i / (nx * ny)) as f32);
-        let solid: Vec<Vec3> =
-            (0..self.values.len()).filter(|&i| self.known[i] && self.values[i] < 0.0).map(place).collect();
-        let slabs: Vec<(Vec3, f32, f32)> = SLABS
-            .iter()
-            .map(|d| {
-                let d = Vec3::from(d.map(|v| v as f32));
-                let (lo, hi) =
-                    solid.iter().map(|x| d.dot(*x)).fold((f32::MAX, f32::MIN), |(lo, hi), h| (lo.min(h), hi.max(h)));
-                (d, lo, hi)
-            })
-            .collect();
-        let beyond = |x: Vec3| slabs.iter().any(|(d, lo, hi)| !(*lo..=*hi).contains(&d.dot(x)));
-        let known = &self.known;
-        self.values
-            .par_iter_mut()
-            .enumerate()
-            .filter(|(i, _)| !known[*i] && beyond(place(*i)))
-            .for_each(|(_, v)| *v = 1.0);
+        self.origin + Vec3::new((i % nx) as f32, (i / nx % ny) as f32, (i / (nx * ny)) as f32) * self.voxel
+    }
+
+    /// What all solid voxels lie within.
+    pub fn hull(&self) -> Slabs {
+        Slabs::around((0..self.values.len()).filter(|&i| self.values[i] < 0.0).map(|i| self.place(i)))
+    }
+
+    fn seen_solid(&self, i: usize) -> bool {
+        self.known[i] && self.values[i] < 0.0
+    }
+
+    /// Empties unknown space beyond the seen surface: below the walls of a cabinet whose underside nobody saw there is no cabinet.
+    fn open_beyond_seen(&mut self) {
+        let seen = Slabs::around((0..self.values.len()).filter(|&i| self.seen_solid(i)).map(|i| self.place(i)));
+        for i in 0..self.values.len() {
+            if !self.known[i] && !seen.hold(self.place(i)) {
+                self.values[i] = 1.0;
+            }
+        }
+    }
+
+    /// Whether a voxel is within [`SHELL`] voxels (along the axes) of solid that a ray reached.
+    fn shell(&self) -> Vec<bool> {
+        let mut near: Vec<bool> = (0..self.values.len()).map(|i| self.seen_solid(i)).collect();
+        let [nx, ny, nz] = self.dims;
+        for (n, stride) in [(nx, 1), (ny, nx), (nz, nx * ny)] {
+            let from = near.clone();
+            near.par_iter_mut().enumerate().for_each(|(i, near)| {
+                let at = i / stride % n;
+                let (back, forth) = (at.min(SHELL), (n - 1 - at).min(SHELL));
+                *near = (i - back * stride..=i + forth * stride).step_by(stride).any(|j| from[j]);
+            });
+        }
+        near
     }
 
     /// Empties unknown space that connects to the grid's border without crossing the surface.

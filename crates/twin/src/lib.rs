@@ -18,6 +18,7 @@ pub mod mjcf;
 pub mod relabel;
 pub mod separate;
 pub mod simplify;
+mod slabs;
 pub mod surface;
 pub mod urdf;
 
