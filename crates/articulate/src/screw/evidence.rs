@@ -86,6 +86,9 @@ const PER_STATE: usize = 8000;
 /// Neighbours that must mostly agree before a contradiction counts.
 const NEIGHBOURS: usize = 8;
 
+/// Noise below this share of a voxel: the states' frames agree already.
+const SHARP: f32 = 0.05;
+
 pub struct Evidence {
     pub lattice: Lattice,
     /// Every sample of each state's surface.
@@ -142,6 +145,11 @@ impl Evidence {
 
     pub fn n_states(&self) -> usize {
         self.spaces.len()
+    }
+
+    /// Whether depth or poses are so noisy that the states' frames have to be brought together.
+    pub fn is_noisy(&self) -> bool {
+        self.tolerance > 4.0 * SHARP * self.lattice.voxel
     }
 
     /// Median distance between a sample and the plane that another state measured where the sample stands still.

@@ -9,6 +9,7 @@
 //! discover       parts one after another, by what they explain (jury) and how usual they are (plausible)
 //! settle         states' frames, all joints together (refine)
 //! labels         which part a sample belongs to
+//! steady         noisy recordings: every view aligned to what stands still, then settled again
 //! doubts         rivals, covariance, what was hardly seen
 //! ```
 
@@ -27,6 +28,7 @@ pub mod refine;
 mod scan;
 pub mod settle;
 pub mod space;
+mod steady;
 
 use cloud::DepthView;
 use evidence::Evidence;
@@ -74,6 +76,13 @@ pub struct Found {
     pub doubts: Vec<String>,
 }
 
+/// Corrects the cameras of every state by what its frame was off.
+fn apply(rig: &[Pose], cameras: &mut [Vec<Pose>]) {
+    for (views, rig) in cameras.iter_mut().zip(rig) {
+        views.iter_mut().for_each(|c| *c = *c * rig.inverse());
+    }
+}
+
 /// Finds parts and joints. `extent`: box of the object over all states; `states(s)`: the views of state s.
 ///
 /// At most [`evidence::MOST_STATES`] states.
@@ -106,11 +115,33 @@ pub fn run<E: From<Cancelled>>(
     )?;
     let discovery = discover::discover(&mut evidence, config.max_parts, seed, progress)?;
     progress.report(0, 1, "refining")?;
-    let settled = settle::settle(&mut evidence, &discovery, seed);
-    for (views, rig) in cameras.iter_mut().zip(&settled.rig) {
-        views.iter_mut().for_each(|c| *c = *c * rig.inverse());
+    let mut settled = settle::settle(&mut evidence, &discovery, seed);
+    apply(&settled.rig, &mut cameras);
+    let mut labels = labels::label_clouds(&evidence, &settled.tree);
+    if config.align_cameras && evidence.is_noisy() {
+        let base = steady::base(&evidence, &labels);
+        let before = evidence;
+        evidence = Evidence::gather::<E>(
+            n_states,
+            lattice,
+            &mut |state| {
+                progress.report(state, n_states, "views of what stands still")?;
+                let mut views = states(state)?;
+                for (view, pose) in views.iter_mut().zip(&cameras[state]) {
+                    view.camera.camera_from_world = *pose;
+                }
+                steady::align(&mut views, &before, state, &labels[state], &base);
+                cameras[state] = views.iter().map(|v| v.camera.camera_from_world).collect();
+                Ok(views)
+            },
+            seed,
+        )?;
+        drop(before);
+        let found = settle::again(&evidence, settled.tree, discovery.cost);
+        settled = settle::settle(&mut evidence, &found, seed);
+        apply(&settled.rig, &mut cameras);
+        labels = labels::label_clouds(&evidence, &settled.tree);
     }
-    let labels = labels::label_clouds(&evidence, &settled.tree);
     let (doubts, rivals) = doubts::doubts(&evidence, &settled, &labels, seed);
     let of_state = |(state, own): (usize, &Vec<u8>)| -> Vec<Labelled> {
         let points = &evidence.clouds[state].points;

@@ -33,8 +33,10 @@ const HOLDING: usize = 3000;
 const FEW: usize = 150;
 /// Pull towards the state's own frame in directions that its base leaves open, share of the pull towards the surface.
 const TETHER: f64 = 0.003;
-/// Noise below this share of a voxel: the states' frames agree already.
-const SHARP: f32 = 0.05;
+/// A settled tree to settle again on other evidence.
+pub fn again(evidence: &Evidence, tree: KinematicTree, cost: f64) -> Discovery {
+    Discovery { verdicts: judge_all(evidence, &tree), tree, cost }
+}
 
 pub fn settle(evidence: &mut Evidence, found: &Discovery, seed: u64) -> Settled {
     let n_states = evidence.n_states();
@@ -48,7 +50,7 @@ pub fn settle(evidence: &mut Evidence, found: &Discovery, seed: u64) -> Settled 
     slides(evidence, &mut tree, &labels, seed);
     simplify(evidence, &mut tree, &labels);
     let free = vec![true; tree.joints.len()];
-    let noisy = evidence.tolerance > SHARP * 4.0 * evidence.lattice.voxel;
+    let noisy = evidence.is_noisy();
     let mut report = Report::default();
     for round in 0..3 {
         if noisy {
