@@ -5,7 +5,7 @@
 //! the slant. The window grows with the measured noise.
 
 use glam::{DVec3, IVec3, Vec3};
-use hingecast_geom::Camera;
+use hingecast_geom::{Camera, PointTree};
 use rayon::prelude::*;
 use std::collections::HashMap;
 
@@ -172,15 +172,54 @@ pub fn merge(planes: impl Iterator<Item = (Vec3, Vec3)>, voxel: f32, least: u32)
     let mut cells: Vec<_> = cells.into_iter().collect();
     cells.sort_by_cached_key(|c| (morton(IVec3::from(c.0.0) - lowest), c.0.1));
     let mut cloud = Cloud::default();
+    let mut pixels = Vec::new();
     for (_, (x, n, count)) in cells {
         let mean = n / count as f64;
         // Normals that disagree within a voxel make a sample that faces nowhere.
         if count >= least && mean.length() > 0.7 {
             cloud.points.push((x / count as f64).as_vec3());
             cloud.normals.push(mean.normalize().as_vec3());
+            pixels.push(count as f32);
         }
     }
+    flatten(&mut cloud, &pixels, voxel);
     cloud
+}
+
+/// Samples are flattened where they are off their neighbours' plane by more than this share of a voxel (median).
+const ROUGH: f32 = 0.05;
+/// Neighbours that hold a sample's plane: within this many voxels, facing alike, so many at most.
+const AROUND: f32 = 1.7;
+const ALIKE: f32 = 0.85;
+const HOLDERS: usize = 24;
+
+/// Noise spreads a surface over two layers of voxels, and whatever is compared with the nearer of two layers seems to lie on it. So
+/// every sample of a rough cloud moves along its normal into the mean plane of its neighbours, by their numbers of pixels.
+fn flatten(cloud: &mut Cloud, pixels: &[f32], voxel: f32) {
+    for _ in 0..2 {
+        let tree = PointTree::new(&cloud.points);
+        let plane = |i: usize| {
+            let (x, n) = (cloud.points[i], cloud.normals[i]);
+            let (mut sum, mut weight) = (0.0, 0.0);
+            for j in tree.k_nearest(x, HOLDERS) {
+                let gap = cloud.points[j as usize] - x;
+                if gap.length() < AROUND * voxel && cloud.normals[j as usize].dot(n) > ALIKE {
+                    sum += pixels[j as usize] * n.dot(gap);
+                    weight += pixels[j as usize];
+                }
+            }
+            sum / weight.max(1.0)
+        };
+        let mut some: Vec<f32> = (0..cloud.points.len()).into_par_iter().step_by(16).map(|i| plane(i).abs()).collect();
+        let half = some.len() / 2;
+        if some.is_empty() || *some.select_nth_unstable_by(half, f32::total_cmp).1 < ROUGH * voxel {
+            return;
+        }
+        let off: Vec<f32> = (0..cloud.points.len()).into_par_iter().map(plane).collect();
+        for ((x, n), off) in cloud.points.iter_mut().zip(&cloud.normals).zip(off) {
+            *x += *n * off;
+        }
+    }
 }
 
 /// Place on Morton's curve: the bits of x, y and z in turns. Coordinates are not negative.
