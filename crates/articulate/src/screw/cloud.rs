@@ -261,4 +261,21 @@ mod tests {
             assert!(m.as_dvec3().cross(n).length() < 1e-3 && x.as_dvec3().dot(n).abs() < 1e-5, "{m} {x}");
         }
     }
+
+    #[test]
+    fn a_noisy_plane_that_straddles_two_layers_becomes_one() {
+        let mut rng = fastrand::Rng::with_seed(3);
+        // z = 0.2 is where two layers of voxels of edge 0.1 meet; the noise is a fifth of a voxel.
+        let planes: Vec<(Vec3, Vec3)> = (0..40_000)
+            .map(|_| {
+                let z = 0.2 + 0.02 * hingecast_geom::random::normal(&mut rng) as f32;
+                (Vec3::new(3.0 * rng.f32(), 3.0 * rng.f32(), z), Vec3::Z)
+            })
+            .collect();
+        let cloud = merge(planes.into_iter(), 0.1, 2);
+        let off: Vec<f32> = cloud.points.iter().map(|x| (x.z - 0.2).abs()).collect();
+        let mean = off.iter().sum::<f32>() / off.len() as f32;
+        // The layers' means lie 0.016 to either side.
+        assert!(cloud.points.len() > 1000 && mean < 0.004, "{mean}");
+    }
 }

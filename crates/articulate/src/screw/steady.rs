@@ -6,6 +6,7 @@
 
 use super::cloud::{DepthView, merge};
 use super::evidence::{Evidence, Motion};
+use super::propose::MANY_STATES;
 use crate::icp::{self, Surface};
 use glam::Vec3;
 use hingecast_geom::Pose;
@@ -28,7 +29,9 @@ pub fn base(evidence: &Evidence, labels: &[Vec<u8>]) -> Surface {
         let own = (0..labels.len()).filter(|&i| labels[i] == 0);
         own.map(|i| (cloud.points[i], cloud.normals[i]))
     });
-    let cloud = merge(still, evidence.lattice.voxel, 2);
+    // What one state alone has may be mislabelled.
+    let least = if evidence.n_states() < MANY_STATES { 1 } else { 2 };
+    let cloud = merge(still, evidence.lattice.voxel, least);
     Surface::new(cloud.points, cloud.normals)
 }
 
@@ -60,4 +63,68 @@ pub fn align(views: &mut [DepthView], evidence: &Evidence, state: usize, labels:
             view.camera.camera_from_world = view.camera.camera_from_world * pose.inverse();
         }
     });
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::cloud::{BACKGROUND, OBJECT};
+    use super::super::space::Lattice;
+    use super::*;
+    use glam::{DVec2, DVec3};
+    use hingecast_geom::{Camera, Cancelled};
+
+    /// The depth of the box [-1, 1] x [-0.6, 0.6] x [-0.4, 0.4].
+    fn picture(camera: &Camera) -> DepthView {
+        let (w, h) = (camera.width, camera.height);
+        let (eye, half) = (camera.centre(), DVec3::new(1.0, 0.6, 0.4));
+        let mut view = DepthView { camera: *camera, depth: vec![0.0; w * h], class: vec![BACKGROUND; w * h] };
+        for i in 0..w * h {
+            let ray = camera.ray(DVec2::new((i % w) as f64 + 0.5, (i / w) as f64 + 0.5));
+            // Slabs: enter the last, leave the first.
+            let (a, b) = ((-half - eye) / ray, (half - eye) / ray);
+            let (enter, leave) = (a.min(b).max_element(), a.max(b).min_element());
+            if enter < leave {
+                let (_, z) = camera.project(eye + ray * enter);
+                (view.depth[i], view.class[i]) = (z as f32, OBJECT);
+            }
+        }
+        view
+    }
+
+    #[test]
+    fn a_camera_that_is_off_comes_back_to_what_stands_still() {
+        let around = |k: usize| {
+            let turn = k as f64 / 12.0 * std::f64::consts::TAU;
+            let eye = DVec3::new(4.0 * turn.cos(), 4.0 * turn.sin(), if k % 2 == 0 { 2.0 } else { -1.5 });
+            Camera::look_at(eye, DVec3::ZERO, DVec3::Z, 96, 72, 0.7)
+        };
+        let cameras: Vec<Camera> = (0..12).map(around).collect();
+        let exact: Vec<DepthView> = cameras.iter().map(picture).collect();
+        let off = Pose::new(glam::DQuat::from_rotation_z(0.006), DVec3::new(0.01, -0.008, 0.005));
+        let disturbed = || {
+            let mut views: Vec<DepthView> = cameras.iter().map(picture).collect();
+            views[1].camera.camera_from_world = views[1].camera.camera_from_world * off;
+            views
+        };
+        let lattice = Lattice::new(Vec3::splat(-1.1), Vec3::splat(1.1), 48);
+        let gathered = |views: &dyn Fn() -> Vec<DepthView>| {
+            Evidence::gather::<Cancelled>(1, lattice, &mut |_| Ok(views()), 1).expect("nobody stops it")
+        };
+        let whole = gathered(&|| exact.iter().map(|v| picture(&v.camera)).collect());
+        let base = base(&whole, &[vec![0; whole.clouds[0].points.len()]]);
+        let here = gathered(&disturbed);
+        let mut views = disturbed();
+        align(&mut views, &here, 0, &vec![0; here.clouds[0].points.len()], &base);
+        // This one sees three faces of the box: nothing is open.
+        let error = |view: &DepthView| {
+            let back = view.camera.camera_from_world.inverse() * cameras[1].camera_from_world;
+            back.apply(DVec3::ZERO).length()
+        };
+        let before = error(&disturbed()[1]);
+        assert!(error(&views[1]) < 0.25 * before, "{} of {before}", error(&views[1]));
+        // Nothing that stands still in sight: the camera stays.
+        let mut views = disturbed();
+        align(&mut views, &here, 0, &vec![1; here.clouds[0].points.len()], &base);
+        assert_eq!(error(&views[1]), before);
+    }
 }
