@@ -83,14 +83,34 @@ pub fn label_clouds(evidence: &Evidence, tree: &KinematicTree) -> Vec<Vec<u8>> {
             });
         }
     }
-    let label = |state: usize| {
+    let plain = |state: usize| -> Vec<u8> {
         let smoothed = smooth(&costs[state], &near[state], n_parts);
-        let mut labels: Vec<u8> = smoothed.chunks_exact(n_parts).map(|c| cheapest(n_parts, |p| c[p])).collect();
+        smoothed.chunks_exact(n_parts).map(|c| cheapest(n_parts, |p| c[p])).collect()
+    };
+    let plain: Vec<Vec<u8>> = (0..n_states).into_par_iter().map(plain).collect();
+    let patched = |state: usize| {
+        let mut labels = plain[state].clone();
         let cloud = &evidence.clouds[state];
         whole_patches(&mut labels, cloud, &near[state], &verdicts[state], n_parts, evidence.lattice.voxel);
         labels
     };
-    (0..n_states).into_par_iter().map(label).collect()
+    let patched: Vec<Vec<u8>> = (0..n_states).into_par_iter().map(patched).collect();
+    // A patch may reach beyond its owner, over the rim of the case that ends flush with the drawer's back. Where a sample's place in
+    // the other states is what it was before, and not the owner's, it stays what it was.
+    let agreeing = |state: usize, i: usize, part: u8| {
+        let v = &verdicts[state][i * n_parts + part as usize];
+        let confirms = |t: &usize| {
+            let x = between[part as usize][state][*t].apply(evidence.clouds[state].points[i]);
+            v.support >> t & 1 == 1 && evidence.clouds[*t].nearest(x).is_some_and(|(j, _)| patched[*t][j] == part)
+        };
+        (0..n_states).filter(confirms).count() as i64 - 2 * v.against.count_ones() as i64
+    };
+    let settled = |state: usize| -> Vec<u8> {
+        let both = plain[state].iter().zip(&patched[state]).enumerate();
+        let keeps = |i: usize, was: u8, is: u8| was == is || agreeing(state, i, is) >= agreeing(state, i, was);
+        both.map(|(i, (&was, &is))| if keeps(i, was, is) { is } else { was }).collect()
+    };
+    (0..n_states).into_par_iter().map(settled).collect()
 }
 
 /// A flat patch has at least this many samples.
