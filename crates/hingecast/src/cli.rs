@@ -342,7 +342,7 @@ pub struct Rollout {
     /// Seed of the episodes.
     #[arg(long, default_value_t = 0, value_name = "N")]
     pub seed: u64,
-    /// Folder for rollout.json and a strip of pictures of each kind of end [default: none, only the answer].
+    /// Folder for the report: index.html, rollout.json, a strip of pictures of each kind of end [default: none, only the answer].
     #[arg(long, short, value_name = "FOLDER")]
     pub out: Option<PathBuf>,
 }

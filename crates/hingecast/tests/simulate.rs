@@ -39,6 +39,19 @@ fn a_policy_is_rolled_out_in_pairs_and_its_episodes_are_drawn() {
         w["results"].as_array().unwrap().iter().map(|r| r["seed"].as_u64().unwrap()).collect()
     };
     assert_eq!(seeds(&worlds[0]), seeds(&worlds[1]));
+    let page = std::fs::read_to_string(d.path().join(one["report"].as_str().unwrap())).unwrap();
+    let mut shown: Vec<&str> = page.split("<img src=\"").skip(1).map(|rest| rest.split('"').next().unwrap()).collect();
+    shown.sort_unstable();
+    let strips = worlds.iter().flat_map(|w| w["strips"].as_object().unwrap().values());
+    let mut written: Vec<&str> = strips.map(|s| s.as_str().unwrap().rsplit('/').next().unwrap()).collect();
+    written.sort_unstable();
+    assert_eq!(shown, written, "the report shows every strip once");
+    // The numbers are those of the answer.
+    for w in worlds {
+        let row = format!("<td>{}</td><td class=n>{} / 3</td>", w["name"].as_str().unwrap(), w["successes"]);
+        assert!(page.contains(&row), "'{row}' is not in {page}");
+    }
+    assert!(page.contains("Paired differences to 'true'") && page.contains("3 episodes are few"), "{page}");
     for strip in worlds[0]["strips"].as_object().unwrap().values() {
         let picture = image::open(d.path().join(strip.as_str().unwrap())).unwrap().to_rgb8();
         // Six pictures, and the arm moved: the first differs from the last.

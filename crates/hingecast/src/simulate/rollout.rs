@@ -16,7 +16,7 @@ use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicUsize, Ordering};
 
 /// Seconds of a control step.
-const STEP_SECS: f64 = 0.05;
+pub const STEP_SECS: f64 = 0.05;
 
 /// Settings are chosen on other episodes than those that are reported (seed 0 and its neighbours).
 const SCORE_SEED: u64 = 1 << 20;
