@@ -301,10 +301,11 @@ pub struct Demos {
     /// Simulated metres per unit of the model file [default: at most 1, so that the arm reaches all of the joint's way].
     #[arg(long, value_name = "FACTOR")]
     pub scale: Option<f64>,
-    /// Who demonstrates.
-    #[arg(long, default_value = "scripted", value_parser = ["scripted"])]
+    /// Who demonstrates; teleop: you, at the keyboard of this terminal, 20 Hz. Each episode is in the file once it is kept; the
+    /// same command goes on with the file.
+    #[arg(long, default_value = "scripted", value_parser = ["scripted", "teleop"])]
     pub expert: String,
-    /// Successful episodes to record.
+    /// Successful episodes to record (teleop: episodes to keep, unless you quit before).
     #[arg(short, default_value_t = 300, value_name = "N", value_parser = at_least_one)]
     pub n: usize,
     /// File to write, robomimic's HDF5; needed unless --inspect is given [default: none].

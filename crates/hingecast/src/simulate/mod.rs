@@ -4,6 +4,7 @@ pub mod record;
 pub mod replay;
 pub mod rollout;
 mod strip;
+pub mod teleop;
 
 use crate::failure::Result;
 use hingecast_capture::object::ArticulatedObject;
