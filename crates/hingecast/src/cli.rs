@@ -113,6 +113,10 @@ pub struct SynthSettings {
     /// A hand and forearm reach in on this share of the training frames [default without a value: 0.2].
     #[arg(long, value_name = "SHARE", num_args = 0..=1, default_missing_value = "0.2")]
     pub occluders: Option<f64>,
+    /// A recording of play: in every training frame hands hold the parts that move, and move along, as cameras see a person who
+    /// plays with the object; their pixels are masked, frames that show little else are marked.
+    #[arg(long, conflicts_with = "occluders")]
+    pub play: bool,
     /// First and last value of a joint, radians (hinge) or scene units (slide); may be repeated [default: what it can do].
     #[arg(long = "range", value_name = "JOINT=FROM:TO")]
     pub ranges: Vec<String>,
