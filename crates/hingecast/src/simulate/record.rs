@@ -19,6 +19,9 @@ const BLOCK: usize = 32;
 /// One demonstration of ten is for validation.
 const VALID_EVERY: usize = 10;
 
+/// What the names of our worlds begin with in `env_args`.
+pub const ENV_NAME: &str = "hingecast-";
+
 /// `env_kwargs` of the file: what replays and rollouts need to make the world again.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct WorldArgs {
@@ -81,7 +84,7 @@ pub fn record(scene: &Scene, args: &WorldArgs, n: usize, progress: &Progress) ->
 /// The file's `env_args`: robomimic's keys with our world in them.
 pub fn env_args(world: &WorldArgs) -> serde_json::Value {
     serde_json::json!({
-        "env_name": format!("hingecast-{}", world.task.kind.name()),
+        "env_name": format!("{ENV_NAME}{}", world.task.kind.name()),
         // robomimic's number for environments of the gym kind.
         "type": 2,
         "env_kwargs": world,

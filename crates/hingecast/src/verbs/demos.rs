@@ -7,7 +7,7 @@ use hingecast::simulate::record::{self, WorldArgs};
 use hingecast::simulate::teleop::session::Session as TeleopSession;
 use hingecast::simulate::teleop::terminal::{self, Console};
 use hingecast::simulate::teleop::{self, Wanted};
-use hingecast::simulate::{object_file, replay, twin_file};
+use hingecast::simulate::{may_write, object_file, replay, twin_file};
 use hingecast_geom::ply::write_whole;
 use hingecast_policy::demos::{read, write};
 use hingecast_sim::trial::make_task;
@@ -28,6 +28,7 @@ pub fn run(session: &Session, args: &Demos) -> Result<Outcome> {
         (Some(name), None) => object_file(name)?,
         (None, None) => object_file(if kind == TaskKind::HingedBox { "hinged_blocks" } else { "covered_box" })?,
     };
+    may_write(out)?;
     if args.expert == "teleop" {
         return teleoperate(session, args, out, object, kind);
     }
@@ -59,7 +60,6 @@ pub fn run(session: &Session, args: &Demos) -> Result<Outcome> {
 fn teleoperate(session: &Session, args: &Demos, out: &Path, object: PathBuf, kind: TaskKind) -> Result<Outcome> {
     let wanted = Wanted { kind, object: &object, joint: args.joint.as_deref(), scale: args.scale };
     let there = teleop::go_on(out, &wanted)?;
-    teleop::may_write(out)?;
     terminal::needed()?;
     let (kept, world) = match there {
         Some((demos, world)) => (Some(demos), WorldArgs { seed: args.seed, ..world }),

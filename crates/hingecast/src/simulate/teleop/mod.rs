@@ -23,15 +23,6 @@ pub struct Wanted<'a> {
     pub scale: Option<f64>,
 }
 
-/// A folder that cannot be written is noticed before a person has worked for it.
-///
-/// # Errors
-/// When it cannot.
-pub fn may_write(file: &Path) -> Result<()> {
-    let probe = file.with_extension("probe.tmp");
-    std::fs::write(&probe, b"").and_then(|()| std::fs::remove_file(&probe)).map_err(Failure::io(file))
-}
-
 /// The demonstrations in `file` and their world, to go on from; `None` where there is no such file.
 ///
 /// # Errors
