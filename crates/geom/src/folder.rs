@@ -6,12 +6,12 @@ use std::path::Path;
 /// Whether the `what` ("run folder") may be written at `folder`: it is new, empty, or holds a file of one of the names `ours`.
 ///
 /// # Errors
-/// It holds something else (`hint` says what to try), or cannot be read.
+/// It holds something else (`hint` says what to try), or is no folder that can be written.
 pub fn may_become(what: &str, folder: &Path, ours: &[&str], hint: &str) -> Result<(), InputError> {
     let mut entries = match std::fs::read_dir(folder) {
         Ok(entries) => entries,
         Err(e) if e.kind() == std::io::ErrorKind::NotFound => return Ok(()),
-        Err(e) => return Err(InputError::read(folder, e)),
+        Err(e) => return Err(InputError::write(folder, e)),
     };
     if entries.next().is_none() || ours.iter().any(|name| folder.join(name).is_file()) {
         return Ok(());

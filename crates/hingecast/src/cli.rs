@@ -113,6 +113,10 @@ pub struct SynthSettings {
     /// A hand and forearm reach in on this share of the training frames [default without a value: 0.2].
     #[arg(long, value_name = "SHARE", num_args = 0..=1, default_missing_value = "0.2")]
     pub occluders: Option<f64>,
+    /// A recording of play: in every training frame hands hold the parts that move, and move along, as cameras see a person who
+    /// plays with the object; their pixels are masked, frames that show little else are marked.
+    #[arg(long, conflicts_with = "occluders")]
+    pub play: bool,
     /// First and last value of a joint, radians (hinge) or scene units (slide); may be repeated [default: what it can do].
     #[arg(long = "range", value_name = "JOINT=FROM:TO")]
     pub ranges: Vec<String>,
@@ -301,10 +305,11 @@ pub struct Demos {
     /// Simulated metres per unit of the model file [default: at most 1, so that the arm reaches all of the joint's way].
     #[arg(long, value_name = "FACTOR")]
     pub scale: Option<f64>,
-    /// Who demonstrates.
-    #[arg(long, default_value = "scripted", value_parser = ["scripted"])]
+    /// Who demonstrates; teleop: you, at the keyboard of this terminal, 20 Hz. Each episode is in the file once it is kept; the
+    /// same command goes on with the file.
+    #[arg(long, default_value = "scripted", value_parser = ["scripted", "teleop"])]
     pub expert: String,
-    /// Successful episodes to record.
+    /// Successful episodes to record (teleop: episodes to keep, unless you quit before).
     #[arg(short, default_value_t = 300, value_name = "N", value_parser = at_least_one)]
     pub n: usize,
     /// File to write, robomimic's HDF5; needed unless --inspect is given [default: none].
@@ -342,7 +347,7 @@ pub struct Rollout {
     /// Seed of the episodes.
     #[arg(long, default_value_t = 0, value_name = "N")]
     pub seed: u64,
-    /// Folder for rollout.json and a strip of pictures of each kind of end [default: none, only the answer].
+    /// Folder for the report: index.html, rollout.json, a strip of pictures of each kind of end [default: none, only the answer].
     #[arg(long, short, value_name = "FOLDER")]
     pub out: Option<PathBuf>,
 }

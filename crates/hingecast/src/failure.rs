@@ -94,7 +94,7 @@ impl From<hingecast_sim::SimError> for Failure {
             S::Load { path, what } => Self::new(
                 format!("MuJoCo cannot load the model: {what}"),
                 path,
-                "look at the file in a viewer of MuJoCo's",
+                "build, export or import it again; python -m mujoco.viewer shows whether MuJoCo alone can load it",
             ),
             S::Task { what, place, hint } => Self::new(what, place, hint),
         }

@@ -4,6 +4,10 @@
 //! R* = exp(0.5 a[3..6]) R (rad), and the fingers' target moves by a tenth of its range towards closed (a[6] > 0) or open;
 //! then `control::torques` every 2 ms. Same scene, seed and actions: same states, to the bit.
 
+mod moment;
+
+pub use moment::Moment;
+
 use crate::SimError;
 use crate::control::{self, ArmState, Goal, N};
 use crate::object::{body_pose, matrix};

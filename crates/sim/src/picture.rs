@@ -5,18 +5,27 @@
 use crate::env::Env;
 use glam::DVec3;
 
-/// Where the picture is taken from, and what its middle shows; world frame, metres. From the side: the hand comes from one end,
-/// the object faces it.
-const EYE: DVec3 = DVec3::new(-0.1, -1.05, 1.4);
-const MIDDLE: DVec3 = DVec3::new(-0.03, 0.0, 0.95);
-/// Half the picture's height at distance 1.
-const HALF_HEIGHT: f64 = 0.36;
+/// Where a picture is taken from and what its middle shows; world frame, metres.
+#[derive(Clone, Copy, Debug)]
+pub struct View {
+    eye: DVec3,
+    middle: DVec3,
+    /// Half the picture's height at distance 1.
+    half_height: f64,
+}
+
+/// From the side: the hand comes from one end, the object faces it.
+pub const SIDE: View =
+    View { eye: DVec3::new(-0.1, -1.05, 1.4), middle: DVec3::new(-0.03, 0.0, 0.95), half_height: 0.36 };
+/// From the far end of the table, near the object: how the hand stands to it across the arm, which the side does not show.
+pub const FRONT: View = View { eye: DVec3::new(0.8, 0.0, 1.2), middle: DVec3::new(0.03, 0.0, 0.95), half_height: 0.26 };
+
 const LAMP: DVec3 = DVec3::new(0.35, -0.5, 0.79);
 const SKY: [f64; 3] = [0.93, 0.95, 0.97];
 
 /// RGB, row by row from the top.
-pub fn take(env: &mut Env, width: usize, height: usize) -> Vec<u8> {
-    let ahead = (MIDDLE - EYE).normalize();
+pub fn take(env: &mut Env, view: &View, width: usize, height: usize) -> Vec<u8> {
+    let ahead = (view.middle - view.eye).normalize();
     let right = ahead.cross(DVec3::Z).normalize();
     let up = right.cross(ahead);
     let colors: Vec<[f64; 3]> = (0..env.scene.model.ffi().ngeom as usize).map(|g| color(env, g)).collect();
@@ -27,9 +36,9 @@ pub fn take(env: &mut Env, width: usize, height: usize) -> Vec<u8> {
         for column in 0..width {
             let pixel = |k: usize, n: usize| (2.0 * (k as f64 + 0.5) - n as f64) / height as f64;
             let (x, y) = (pixel(column, width), -pixel(row, height));
-            let ray = (ahead + HALF_HEIGHT * (x * right + y * up)).normalize();
+            let ray = (ahead + view.half_height * (x * right + y * up)).normalize();
             let mut normal = [0.0; 3];
-            let (geom, _) = data.ray(&EYE.to_array(), &ray.to_array(), None, true, None, Some(&mut normal));
+            let (geom, _) = data.ray(&view.eye.to_array(), &ray.to_array(), None, true, None, Some(&mut normal));
             let rgb = geom.map_or(SKY, |g| {
                 let facing = DVec3::from(normal) * -DVec3::from(normal).dot(ray).signum();
                 let light = 0.45 + 0.55 * facing.dot(LAMP).max(0.0);

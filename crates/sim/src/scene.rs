@@ -68,6 +68,10 @@ impl Scene {
     fn compile(config: &SceneConfig, task: &TaskSpec) -> Result<Self, SimError> {
         let path = &config.object;
         let place = path.display().to_string();
+        if !path.is_file() && path != Path::new(object::HINGED_BLOCKS) {
+            let hint = "put the file back, or name the object or twin: --object OBJECT, --twin RUN";
+            return Err(SimError::task("the model file is not there", place, hint));
+        }
         let mut child = object::read(path, config.visuals)?;
         if !config.spoil.is_empty() {
             spoil(&mut child, config, task)?;
@@ -77,6 +81,7 @@ impl Scene {
         attach(&mut spec, &mut child, task.scale, !free, path)?;
         let model = spec.compile().map_err(|e| SimError::load(path, e))?;
         let xml = spec.save_xml_string(1 << 24).map_err(|e| SimError::load(path, e))?;
+        check_numbers(&model, &place)?;
         let model = Arc::new(model);
         let mut data = MjData::new(model.clone());
         if let Some(row) = mocap(&model) {
@@ -86,6 +91,27 @@ impl Scene {
         let target = Target::find(&mut data, task, &place)?;
         let ids = Ids::new(&model, target.joint.body);
         Ok(Self { model, task: Arc::new(task.clone()), target, xml: Arc::new(xml), ids })
+    }
+}
+
+/// MuJoCo compiles a NaN without a word, and then everything is NaN.
+fn check_numbers(model: &MjModel, place: &str) -> Result<(), SimError> {
+    let all = |rows: &[[f64; 3]]| rows.iter().flatten().all(|x| x.is_finite());
+    let fields = [
+        ("the axis of a joint", all(model.jnt_axis())),
+        ("the place of a joint", all(model.jnt_pos())),
+        ("the limits of a joint", model.jnt_range().iter().flatten().all(|x| x.is_finite())),
+        ("the place of a body", all(model.body_pos())),
+        ("the orientation of a body", model.body_quat().iter().flatten().all(|x| x.is_finite())),
+        ("the mass of a body", model.body_mass().iter().all(|x| x.is_finite())),
+        ("the size of a shape", all(model.geom_size())),
+    ];
+    match fields.into_iter().find(|(_, finite)| !finite) {
+        None => Ok(()),
+        Some((what, _)) => {
+            let hint = "correct the file, or build or export it again";
+            Err(SimError::task(format!("{what} is not finite"), place, hint))
+        }
     }
 }
 

@@ -7,6 +7,7 @@ use crate::grasp::{self, Size};
 use crate::scene::{Scene, SceneConfig};
 use crate::task::{TaskKind, TaskSpec};
 use crate::{SimError, object};
+use mujoco_rs::prelude::*;
 use std::path::Path;
 
 /// Tries per place, and how many of them must succeed to look no further.
@@ -26,7 +27,7 @@ pub struct Made {
 /// # Errors
 /// When the gripper fits nowhere, or the demonstrator never succeeds.
 pub fn make_task(path: &Path, kind: TaskKind, joint: Option<&str>, scale: Option<f64>) -> Result<Made, SimError> {
-    if let Some(s) = scale.filter(|s| !(s.is_finite() && *s > 0.0)) {
+    if let Some(s) = scale.filter(|s| !(1e-4..=1e4).contains(s)) {
         return Err(SimError::task(
             format!("{s} is not a size"),
             "--scale",
@@ -41,12 +42,16 @@ pub fn make_task(path: &Path, kind: TaskKind, joint: Option<&str>, scale: Option
     };
     let config = SceneConfig { object: path.clone(), spoil: Vec::new(), visuals: false };
     let mut best: Option<Made> = None;
-    let mut places = 0;
+    let (mut places, mut in_the_way) = (0, 0);
     'sizes: for size in sizes {
         for candidate in grasp::candidates(&path, kind, joint, size)? {
-            places += 1;
             let scene = Scene::new(&config, &candidate.task)?;
             let mut env = Env::new(&scene);
+            if touches_arm(&mut env) {
+                in_the_way += 1;
+                continue;
+            }
+            places += 1;
             // Seeds far from those of demonstrations and rollouts.
             let runs = (0..TRIES).map(|k| demonstrate(&mut env, u64::MAX - k, |_, _| ()));
             let worked = runs.collect::<Result<Vec<_>, _>>()?.iter().filter(|o| **o == Outcome::Success).count();
@@ -60,9 +65,17 @@ pub fn make_task(path: &Path, kind: TaskKind, joint: Option<&str>, scale: Option
     }
     match best {
         Some(made) if made.worked > 0 => Ok(made),
+        None if in_the_way > 0 => Err(SimError::task(
+            "wherever the gripper could hold it, the object stands where the arm begins",
+            place,
+            "--scale for a smaller object",
+        )),
         Some(_) => Err(SimError::task(
             format!("the demonstrator opened it in none of {} tries at {places} places", TRIES * places),
-            place,
+            match in_the_way {
+                0 => place,
+                n => format!("{place}; at {n} more places it stands where the arm begins"),
+            },
             "--joint for another joint, or --scale for another size: it may be out of reach or stuck",
         )),
         None => Err(SimError::task(
@@ -71,6 +84,18 @@ pub fn make_task(path: &Path, kind: TaskKind, joint: Option<&str>, scale: Option
             "--joint for another joint, or --scale for a smaller object",
         )),
     }
+}
+
+/// Whether arm and object touch where an episode begins: then the arm pushes the part, or is stuck, before it has done anything.
+fn touches_arm(env: &mut Env) -> bool {
+    let model = env.scene.model.clone();
+    let arm = model.name_to_id(MjtObjBase::mjOBJ_BODY, "link0").expect("a body of our own arm");
+    env.data_mut().contact().iter().any(|c| {
+        let bodies = c.geom.map(|g| model.geom_bodyid()[g.max(0) as usize] as usize);
+        let [a, b] = bodies.map(|body| object::hangs_on(&model, body, arm));
+        // Body 0 is the world: table and floor.
+        a != b && !bodies.contains(&0)
+    })
 }
 
 /// One episode of the demonstrator from `seed`; `each` sees the environment before every action. Ends at success or

@@ -31,6 +31,9 @@ pub struct SynthConfig {
     pub noise: Noise,
     /// Share of the training frames into which a hand and forearm reach, 0..1.
     pub occluders: f64,
+    /// A recording of play: in every training frame hands hold the parts that move, and move along; `time` runs. Instead of
+    /// `occluders`.
+    pub play: bool,
     /// Write the truth folder beside the recording.
     pub truth: bool,
     pub seed: u64,
@@ -50,6 +53,7 @@ impl Default for SynthConfig {
             background: [255; 3],
             noise: Noise::None,
             occluders: 0.0,
+            play: false,
             truth: true,
             seed: 0,
         }
@@ -84,6 +88,7 @@ pub(super) fn validate(c: &SynthConfig) -> Result<(), CaptureError> {
         ((8..=4096).contains(&c.size), "size", c.size.to_string(), "8 to 4096 pixels"),
         (c.fov_deg > 5.0 && c.fov_deg < 120.0, "fov_deg", c.fov_deg.to_string(), "5 to 120 degrees"),
         ((0.0..=1.0).contains(&c.occluders), "occluders", c.occluders.to_string(), "a share from 0 to 1"),
+        (!(c.play && c.occluders > 0.0), "occluders", c.occluders.to_string(), "0 with play: hands are in all frames"),
     ];
     match checks.into_iter().find(|(good, ..)| !good) {
         None => Ok(()),

@@ -10,6 +10,7 @@ mod occluder;
 mod output;
 mod plan;
 mod play;
+mod player;
 mod ranges;
 mod render;
 pub(crate) mod scene;
@@ -50,7 +51,7 @@ pub fn synth(
     let work = Staging::new(&out)?;
     let truth_work = config.truth.then(|| Staging::new(&truth_out)).transpose()?;
     for folder in ["rgb", "depth", "mask", "occluder"] {
-        if folder != "occluder" || config.occluders > 0.0 {
+        if folder != "occluder" || config.play || config.occluders > 0.0 {
             work.folder(folder)?;
         }
     }
@@ -62,14 +63,16 @@ pub fn synth(
     let ranges = plan::ranges(object, config)?;
     let states = plan::joint_values(config, &ranges);
     let shots = plan::shots(object, config, &states);
+    let metres_per_unit = if object.metric { 1.0 } else { ASSUMED_DIAGONAL_METRES / object.diagonal().max(1e-9) };
     let studio = Studio {
         object,
         config,
         states: &states,
+        held: if config.play { player::hold(object, &states[..config.states], metres_per_unit) } else { Vec::new() },
         background: Vec3::from_array(
             config.background.map(|c| crate::object::texture::linear_from_srgb(f32::from(c) / 255.0)),
         ),
-        metres_per_unit: if object.metric { 1.0 } else { ASSUMED_DIAGONAL_METRES / object.diagonal().max(1e-9) },
+        metres_per_unit,
         depth_scale: plan::depth_scale(object, &shots),
         root: &work.path,
         truth: truth_work.as_ref().map(|t| t.path.as_path()),
@@ -113,6 +116,8 @@ struct Studio<'a> {
     object: &'a ArticulatedObject,
     config: &'a SynthConfig,
     states: &'a [Vec<f64>],
+    /// The hands of a play; none otherwise.
+    held: Vec<player::Hand>,
     /// Linear light.
     background: Vec3,
     metres_per_unit: f64,
@@ -122,7 +127,7 @@ struct Studio<'a> {
 }
 
 impl Studio<'_> {
-    /// Renders and writes all views of a state; the same hand reaches into some of them.
+    /// Renders and writes all views of a state; the same hand reaches into some of them, or holds on in all.
     fn record_state(
         &self,
         state: usize,
@@ -131,14 +136,18 @@ impl Studio<'_> {
     ) -> Result<Vec<Frame>, CaptureError> {
         let mut poses = self.object.tree.poses(&self.states[state]);
         let scene = scene::Scene::new(self.object.parts.iter().zip(poses.iter().copied()));
-        let hand = (self.config.occluders > 0.0)
+        let reaching = (self.config.occluders > 0.0)
             .then(|| occluder::hand(self.object, self.states, state, self.metres_per_unit, self.config.seed));
-        let looks = shade::Looks::new(self.object, hand.as_ref());
-        let with_hand = hand.as_ref().map(|hand| {
-            let parts: Vec<(&PartGeometry, Pose)> = self.object.parts.iter().zip(poses.iter().copied()).collect();
-            scene::Scene::new(parts.into_iter().chain([(hand, Pose::IDENTITY)]))
+        let holding = self.held.iter().filter(|h| h.states.contains(&state)).map(|h| (&h.geometry, poses[h.part]));
+        let hands: Vec<(&PartGeometry, Pose)> =
+            holding.chain(reaching.as_ref().map(|hand| (hand, Pose::IDENTITY))).collect();
+        let share = if self.config.play { 1.0 } else { self.config.occluders };
+        let looks = shade::Looks::new(self.object, hands.iter().map(|h| h.0));
+        let with_hands = (!hands.is_empty()).then(|| {
+            let parts = self.object.parts.iter().zip(poses.iter().copied());
+            scene::Scene::new(parts.chain(hands.iter().copied()))
         });
-        poses.push(Pose::IDENTITY);
+        poses.extend(hands.iter().map(|h| h.1));
         shots
             .par_iter()
             .map(|shot| {
@@ -146,10 +155,10 @@ impl Studio<'_> {
                 let seed = (self.config.seed << 32) ^ ((shot.state as u64) << 16) ^ shot.view as u64;
                 let mut rng = fastrand::Rng::with_seed(seed.wrapping_mul(0x9e37_79b9_7f4a_7c15));
                 let train = shot.split == Split::Train;
-                let reached = train && rng.f64() < self.config.occluders;
-                let seen = if reached { with_hand.as_ref().unwrap_or(&scene) } else { &scene };
+                let reached = train && rng.f64() < share;
+                let seen = if reached { with_hands.as_ref().unwrap_or(&scene) } else { &scene };
                 let picture = render::render(seen, &looks, &poses, &shot.camera, self.background);
-                let mut exposure = Exposure::new(picture, self.object.parts.len());
+                let mut exposure = Exposure::new(picture, self.object.parts.len(), shot.camera.width);
                 if reached {
                     exposure.note_hidden(&scene, &shot.camera);
                 }
@@ -157,7 +166,8 @@ impl Studio<'_> {
                 if train && self.config.noise == Noise::D435 {
                     noise::d435(&mut exposure, &mut camera, self.metres_per_unit, &mut rng);
                 }
-                let frame = output::write(shot, camera, &exposure, self.depth_scale, self.root, self.truth)?;
+                let mut frame = output::write(shot, camera, &exposure, self.depth_scale, self.root, self.truth)?;
+                frame.time = (self.config.play && train).then_some(state as f64 * player::SECS_PER_STATE);
                 tell()?;
                 Ok(frame)
             })

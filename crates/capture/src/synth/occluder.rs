@@ -1,12 +1,12 @@
-//! The hand and forearm of the person who moves the object, made of capsules. It grips the part that moves most around
-//! this state and comes from outside.
+//! The hand and forearm of the person who moves the object, made of capsules. Here it grips the part that moves most around a
+//! state and comes from outside, anew in every state; `player` holds on.
 
 use crate::object::{ArticulatedObject, PartGeometry, shapes};
 use glam::{DQuat, DVec3};
 use hingecast_geom::Pose;
 
 /// Metres, of a grown-up: forearm radius and length, palm radius and half length, finger radius and length.
-const FOREARM: [f64; 2] = [0.042, 0.45];
+pub(super) const FOREARM: [f64; 2] = [0.042, 0.45];
 const PALM: [f64; 2] = [0.035, 0.03];
 const FINGER: [f64; 2] = [0.009, 0.075];
 /// sRGB.
@@ -39,6 +39,11 @@ pub(super) fn hand(
     let random = DVec3::new(rng.f64() - 0.5, rng.f64() - 0.5, rng.f64());
     let outward = ((grip - centre).normalize_or(DVec3::X) + 0.7 * random + 0.2 * DVec3::Z).normalize();
 
+    arm(grip, outward, unit, skin)
+}
+
+/// A hand that grips at `grip` and its forearm, which comes along `outward`. `unit`: scene units of a metre.
+pub(super) fn arm(grip: DVec3, outward: DVec3, unit: f64, skin: u32) -> PartGeometry {
     let mut out = PartGeometry::default();
     let mut capsule = |from: DVec3, to: DVec3, radius: f64| {
         let along = (to - from).normalize_or(DVec3::Z);

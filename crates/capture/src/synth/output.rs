@@ -22,17 +22,22 @@ pub(crate) struct Exposure {
     pub mask: Vec<u8>,
     /// Part id + 1, 0 = background; stays exact whatever the sensor does.
     pub labels: Vec<u8>,
-    /// 255 = hand.
+    /// 255 = hand, also where it only tints the pixel: a ring of one pixel around it, since colour is supersampled.
     pub occluder: Option<Vec<u8>>,
     pub occluded: bool,
 }
 
 impl Exposure {
     /// `n_parts` of the object; a part beyond them is the hand.
-    pub fn new(picture: Picture, n_parts: usize) -> Self {
+    pub fn new(picture: Picture, n_parts: usize, width: usize) -> Self {
         let is_hand = |p: u8| usize::from(p) > n_parts;
         let labels: Vec<u8> = picture.part.iter().map(|&p| if is_hand(p) { 0 } else { p }).collect();
-        let hand: Vec<u8> = picture.part.iter().map(|&p| if is_hand(p) { 255 } else { 0 }).collect();
+        let height = picture.part.len() / width.max(1);
+        let near = |k: usize, end: usize| k.saturating_sub(1)..(k + 2).min(end);
+        let tinted = |i: usize| {
+            near(i / width, height).any(|y| near(i % width, width).any(|x| is_hand(picture.part[y * width + x])))
+        };
+        let hand: Vec<u8> = (0..picture.part.len()).map(|i| if tinted(i) { 255 } else { 0 }).collect();
         Self {
             rgb: picture.rgb,
             depth: picture.depth,

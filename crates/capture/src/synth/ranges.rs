@@ -95,7 +95,7 @@ fn subtree(object: &ArticulatedObject, part: usize) -> Vec<usize> {
 }
 
 /// Points spread over the surfaces by area.
-fn sample<'a>(parts: impl Iterator<Item = &'a PartGeometry>) -> Vec<DVec3> {
+pub(super) fn sample<'a>(parts: impl Iterator<Item = &'a PartGeometry>) -> Vec<DVec3> {
     let mut mesh = TriMesh::default();
     for p in parts {
         mesh.append(&TriMesh { vertices: p.vertices.clone(), faces: p.faces.clone(), colors: Vec::new() });

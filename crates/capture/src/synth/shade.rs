@@ -14,7 +14,7 @@ const GROUND: f32 = 0.42;
 const SKY: f32 = 0.58;
 const LAMPS: [([f32; 3], f32); 2] = [([0.48, -0.36, 0.80], 0.28), ([-0.74, 0.56, 0.37], 0.12)];
 
-/// What shading needs: the parts (a hand may follow the object's own), materials, and per face how many texels a unit of
+/// What shading needs: the parts (hands may follow the object's own), materials, and per face how many texels a unit of
 /// length covers, for the mip level.
 pub(crate) struct Looks<'a> {
     object: &'a ArticulatedObject,
@@ -27,10 +27,10 @@ pub(crate) struct Looks<'a> {
 }
 
 impl<'a> Looks<'a> {
-    pub fn new(object: &'a ArticulatedObject, hand: Option<&'a PartGeometry>) -> Self {
+    pub fn new(object: &'a ArticulatedObject, hands: impl IntoIterator<Item = &'a PartGeometry>) -> Self {
         let linear =
             |c: [f32; 3]| Vec3::from_array(c.map(|x| crate::object::texture::linear_from_srgb(x.clamp(0.0, 1.0))));
-        let parts: Vec<&PartGeometry> = object.parts.iter().chain(hand).collect();
+        let parts: Vec<&PartGeometry> = object.parts.iter().chain(hands).collect();
         let mut materials = object.materials.clone();
         materials.push(Material { color: occluder::SKIN, texture: None });
         let colors = materials.iter().map(|m| linear(m.color)).collect();

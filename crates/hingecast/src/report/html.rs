@@ -9,19 +9,23 @@ const STYLE: &str = "
 body{font:15px/1.5 system-ui,sans-serif;margin:2rem auto;max-width:1100px;padding:0 1rem;color:#222}
 h1{font-size:1.5rem}h2{font-size:1.15rem;margin-top:2rem}
 table{border-collapse:collapse}td,th{padding:.25rem .7rem;text-align:left;border-bottom:1px solid #ddd}
-td.n{text-align:right;font-variant-numeric:tabular-nums}
+td.n{text-align:right;font-variant-numeric:tabular-nums;white-space:nowrap}
 img{max-width:100%;display:block;margin:.3rem 0}figure{margin:0 0 1rem}figcaption{color:#555;font-size:.9rem}
 .doubts{background:#fff4e0;border-left:4px solid #e69f00;padding:.6rem 1rem}
 .fine{background:#e9f6ec;border-left:4px solid #009e73;padding:.6rem 1rem}
 .chip{display:inline-block;width:.9em;height:.9em;border-radius:2px;margin-right:.4em;vertical-align:-.1em}
 code{background:#f4f4f4;padding:0 .25em}";
 
-pub(crate) fn page(run: &RunFolder, content: &Content) -> String {
-    let twin = &content.twin;
-    let mut out = format!(
+/// The page up to its heading.
+pub(crate) fn head(title: &str) -> String {
+    format!(
         "<!doctype html><html lang=\"en\"><meta charset=\"utf-8\"><title>{0}</title><style>{STYLE}</style><h1>{0}</h1>",
-        escape(&twin.name)
-    );
+        escape(title)
+    )
+}
+
+pub(crate) fn page(run: &RunFolder, content: &Content) -> String {
+    let mut out = head(&content.twin.name);
     doubts(&mut out, &run.record.doubts);
     let _ = write!(out, "<h2>Parts and axes on the photos</h2>");
     for (file, caption) in &content.overlays {
@@ -46,7 +50,7 @@ pub(crate) fn page(run: &RunFolder, content: &Content) -> String {
     out + "</html>\n"
 }
 
-fn doubts(out: &mut String, doubts: &[String]) {
+pub(crate) fn doubts(out: &mut String, doubts: &[String]) {
     if doubts.is_empty() {
         let _ = write!(out, "<div class=\"fine\">No doubts were found. That is not proof: look at the pictures.</div>");
         return;
@@ -139,6 +143,6 @@ fn time(out: &mut String, run: &RunFolder) {
     );
 }
 
-fn escape(text: &str) -> String {
+pub(crate) fn escape(text: &str) -> String {
     text.replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;").replace('"', "&quot;")
 }

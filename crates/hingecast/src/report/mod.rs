@@ -3,6 +3,10 @@
 pub mod draw;
 mod html;
 mod plot;
+#[cfg(feature = "mujoco")]
+pub mod rollout;
+#[cfg(feature = "mujoco")]
+mod rollout_plot;
 
 use crate::failure::{Failure, Result};
 use crate::pipeline::labels::Labeller;

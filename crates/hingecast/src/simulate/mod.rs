@@ -4,8 +4,9 @@ pub mod record;
 pub mod replay;
 pub mod rollout;
 mod strip;
+pub mod teleop;
 
-use crate::failure::Result;
+use crate::failure::{Failure, Result};
 use hingecast_capture::object::ArticulatedObject;
 use std::path::{Path, PathBuf};
 
@@ -30,5 +31,14 @@ pub fn twin_file(run: &Path) -> Result<PathBuf> {
 
 /// Demonstrations remember the object by its whole path.
 fn absolute(path: &Path) -> Result<PathBuf> {
-    path.canonicalize().map_err(crate::failure::Failure::io(path))
+    path.canonicalize().map_err(Failure::io(path))
+}
+
+/// A folder that cannot be written is noticed before the work and not after it.
+///
+/// # Errors
+/// When it cannot.
+pub fn may_write(file: &Path) -> Result<()> {
+    let probe = file.with_extension("probe.tmp");
+    std::fs::write(&probe, b"").and_then(|()| std::fs::remove_file(&probe)).map_err(Failure::io(file))
 }

@@ -6,6 +6,7 @@
 use crate::failure::{Failure, Result};
 use hingecast_geom::Progress;
 use hingecast_policy::{Demos, Episode};
+use hingecast_sim::env::ACTION;
 use hingecast_sim::trial::demonstrate;
 use hingecast_sim::{Env, Outcome, Scene, TaskSpec};
 use rayon::prelude::*;
@@ -17,6 +18,9 @@ use std::path::PathBuf;
 const BLOCK: usize = 32;
 /// One demonstration of ten is for validation.
 const VALID_EVERY: usize = 10;
+
+/// What the names of our worlds begin with in `env_args`.
+pub const ENV_NAME: &str = "hingecast-";
 
 /// `env_kwargs` of the file: what replays and rollouts need to make the world again.
 #[derive(Clone, Debug, Serialize, Deserialize)]
@@ -55,7 +59,7 @@ pub fn record(scene: &Scene, args: &WorldArgs, n: usize, progress: &Progress) ->
         }
         let block: Vec<Result<(Outcome, Episode)>> = (attempts..attempts + BLOCK)
             .into_par_iter()
-            .map_init(|| Env::new(scene), |env, k| attempt(env, (args.seed << 20) + k as u64, progress))
+            .map_init(|| Env::new(scene), |env, k| attempt(env, episode_seed(args.seed, k), progress))
             .collect();
         for made in block {
             let (outcome, episode) = made?;
@@ -73,6 +77,22 @@ pub fn record(scene: &Scene, args: &WorldArgs, n: usize, progress: &Progress) ->
         progress.report(episodes.len(), n, &note)?;
     }
     let steps = episodes.iter().map(|e| e.actions.len()).sum();
+    let demos = Demos { env_args: env_args(args), masks: masks(episodes.len()), episodes };
+    Ok((demos, Recorded { kept: n, thrown_away, steps }))
+}
+
+/// The file's `env_args`: robomimic's keys with our world in them.
+pub fn env_args(world: &WorldArgs) -> serde_json::Value {
+    serde_json::json!({
+        "env_name": format!("{ENV_NAME}{}", world.task.kind.name()),
+        // robomimic's number for environments of the gym kind.
+        "type": 2,
+        "env_kwargs": world,
+    })
+}
+
+/// Which of `n` episodes train and which validate.
+pub fn masks(n: usize) -> BTreeMap<String, Vec<String>> {
     let names = |valid: bool| -> Vec<String> {
         (0..n).filter(|i| (i % VALID_EVERY == VALID_EVERY - 1) == valid).map(|i| format!("demo_{i}")).collect()
     };
@@ -80,41 +100,76 @@ pub fn record(scene: &Scene, args: &WorldArgs, n: usize, progress: &Progress) ->
     if n >= VALID_EVERY {
         masks.insert("valid".to_string(), names(true));
     }
-    let env_args = serde_json::json!({
-        "env_name": format!("hingecast-{}", args.task.kind.name()),
-        // robomimic's number for environments of the gym kind.
-        "type": 2,
-        "env_kwargs": args,
-    });
-    Ok((Demos { env_args, episodes, masks }, Recorded { kept: n, thrown_away, steps }))
+    masks
+}
+
+/// Seed of the `k`-th episode of a recording with `seed`.
+pub fn episode_seed(seed: u64, k: usize) -> u64 {
+    (seed << 20) + k as u64
 }
 
 fn attempt(env: &mut Env, seed: u64, progress: &Progress) -> Result<(Outcome, Episode)> {
     progress.check()?;
-    env.reset(seed);
-    let mut episode = Episode { model_file: env.scene.xml_at(&env.start().place), ..Episode::default() };
-    let mut seen: Vec<BTreeMap<String, Vec<f64>>> = Vec::new();
-    let outcome = demonstrate(env, seed, |env, action| {
+    let mut tape = None;
+    let outcome = demonstrate(env, seed, |env, action| tape.get_or_insert_with(|| Tape::begin(env)).note(env, action))?;
+    // The horizon of a task is at least one step long.
+    let tape = tape.unwrap_or_else(|| Tape::begin(env));
+    Ok((outcome, tape.finish(env)))
+}
+
+/// An episode while it is being recorded.
+pub struct Tape {
+    episode: Episode,
+    /// What was seen before each action.
+    seen: Vec<BTreeMap<String, Vec<f64>>>,
+}
+
+impl Tape {
+    /// Right after a reset: the episode's `model_file` says where the object stands.
+    pub fn begin(env: &Env) -> Self {
+        let model_file = env.scene.xml_at(&env.start().place);
+        Self { episode: Episode { model_file, ..Episode::default() }, seen: Vec::new() }
+    }
+
+    /// Before the step that `action` makes.
+    pub fn note(&mut self, env: &Env, action: &[f64; ACTION]) {
+        self.seen.push(env.observe());
+        self.episode.states.push(env.state());
+        self.episode.actions.push(*action);
+    }
+
+    /// The actions so far.
+    pub fn actions(&self) -> &[[f64; ACTION]] {
+        &self.episode.actions
+    }
+
+    /// Forgets all but the first `steps` steps.
+    pub fn cut(&mut self, steps: usize) {
+        self.seen.truncate(steps);
+        self.episode.states.truncate(steps);
+        self.episode.actions.truncate(steps);
+    }
+
+    /// After the last step. The last reward is 1 when the task is done.
+    pub fn finish(self, env: &Env) -> Episode {
+        let Self { mut episode, mut seen } = self;
         seen.push(env.observe());
-        episode.states.push(env.state());
-        episode.actions.push(*action);
-    })?;
-    seen.push(env.observe());
-    let steps = episode.actions.len();
-    for (t, observation) in seen.into_iter().enumerate() {
-        for (key, row) in observation {
-            if t < steps {
-                episode.obs.entry(key.clone()).or_default().push(row.clone());
-            }
-            if t > 0 {
-                episode.next_obs.entry(key).or_default().push(row);
+        let steps = episode.actions.len();
+        for (t, observation) in seen.into_iter().enumerate() {
+            for (key, row) in observation {
+                if t < steps {
+                    episode.obs.entry(key.clone()).or_default().push(row.clone());
+                }
+                if t > 0 {
+                    episode.next_obs.entry(key).or_default().push(row);
+                }
             }
         }
+        let last = |t: usize| t + 1 == steps && env.outcome() == Outcome::Success;
+        episode.rewards = (0..steps).map(|t| f64::from(u8::from(last(t)))).collect();
+        episode.dones = (0..steps).map(last).collect();
+        episode
     }
-    let last = |t: usize| t + 1 == steps && outcome == Outcome::Success;
-    episode.rewards = (0..steps).map(|t| f64::from(u8::from(last(t)))).collect();
-    episode.dones = (0..steps).map(last).collect();
-    Ok((outcome, episode))
 }
 
 /// As the JSON says it, with spaces.

@@ -59,6 +59,13 @@ fn one(env: &mut Env, episode: &Episode, index: usize) -> Result<(Option<usize>,
             "record again: hingecast demos",
         )
     })?;
+    if episode.model_file.is_empty() {
+        return Err(Failure::new(
+            "it is not known where the object stood",
+            format!("data/demo_{index}, attribute model_file: not there"),
+            "copy the attribute from the file that this one was made from, or record again: hingecast demos",
+        ));
+    }
     let place = Scene::place_in(&episode.model_file)?;
     env.start_from(&Start { place, state: first.clone() })?;
     let mut difference = None;

@@ -1,7 +1,7 @@
 //! A policy in seeded episodes on several worlds: the true object, its twin, spoiled ones. Episode k has the same seed everywhere,
 //! so worlds are compared in pairs (McNemar's exact test, `policy::statistics`).
 
-use super::record::outcome_name;
+use super::record::{ENV_NAME, outcome_name};
 use super::strip;
 use crate::failure::{Failure, Result};
 use glam::DVec3;
@@ -16,7 +16,7 @@ use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicUsize, Ordering};
 
 /// Seconds of a control step.
-const STEP_SECS: f64 = 0.05;
+pub const STEP_SECS: f64 = 0.05;
 
 /// Settings are chosen on other episodes than those that are reported (seed 0 and its neighbours).
 const SCORE_SEED: u64 = 1 << 20;
@@ -250,5 +250,8 @@ pub fn world_of_policy(folder: &Path) -> Result<Option<super::record::WorldArgs>
     };
     let value: serde_json::Value = serde_json::from_slice(&bytes).map_err(damaged)?;
     // Demonstrations of another simulator have other arguments: then the task comes from the object.
-    Ok(serde_json::from_value(value["env_kwargs"].clone()).ok())
+    if !value["env_name"].as_str().is_some_and(|name| name.starts_with(ENV_NAME)) {
+        return Ok(None);
+    }
+    serde_json::from_value(value["env_kwargs"].clone()).map(Some).map_err(damaged)
 }

@@ -22,7 +22,7 @@ pub fn write(scene: &Scene, start: &Start, states: &[Vec<f64>], path: &Path) -> 
             let mut env = Env::new(scene);
             env.start_from(start)?;
             env.set_state(&states[k * last / (FRAMES - 1)])?;
-            let pixels = picture::take(&mut env, WIDTH, HEIGHT);
+            let pixels = picture::take(&mut env, &picture::SIDE, WIDTH, HEIGHT);
             Ok(RgbImage::from_raw(WIDTH as u32, HEIGHT as u32, pixels).expect("three bytes a pixel"))
         })
         .collect();

@@ -4,12 +4,15 @@ use super::{Outcome, Session};
 use crate::cli::Demos;
 use hingecast::failure::{Failure, Result};
 use hingecast::simulate::record::{self, WorldArgs};
-use hingecast::simulate::{object_file, replay, twin_file};
+use hingecast::simulate::teleop::session::Session as TeleopSession;
+use hingecast::simulate::teleop::terminal::{self, Console};
+use hingecast::simulate::teleop::{self, Wanted};
+use hingecast::simulate::{may_write, object_file, replay, twin_file};
 use hingecast_geom::ply::write_whole;
 use hingecast_policy::demos::{read, write};
 use hingecast_sim::trial::make_task;
-use hingecast_sim::{Scene, SceneConfig, TaskKind};
-use std::path::Path;
+use hingecast_sim::{Scene, SceneConfig, TaskKind, TaskSpec};
+use std::path::{Path, PathBuf};
 
 pub fn run(session: &Session, args: &Demos) -> Result<Outcome> {
     if let Some(file) = &args.inspect {
@@ -25,21 +28,13 @@ pub fn run(session: &Session, args: &Demos) -> Result<Outcome> {
         (Some(name), None) => object_file(name)?,
         (None, None) => object_file(if kind == TaskKind::HingedBox { "hinged_blocks" } else { "covered_box" })?,
     };
-    let start = std::time::Instant::now();
-    let made = make_task(&object, kind, args.joint.as_deref(), args.scale)?;
-    let task = &made.task;
-    session.ui.say(&format!(
-        "task: {} '{}' of {}, size x {}, held where it is {:.0} mm thick",
-        kind.name(),
-        task.joint,
-        object.display(),
-        task.scale,
-        1e3 * task.width
-    ));
-    if made.worked < made.of {
-        session.ui.say(&format!("doubt: only {} of {} first tries opened it", made.worked, made.of));
+    may_write(out)?;
+    if args.expert == "teleop" {
+        return teleoperate(session, args, out, object, kind);
     }
-    let scene = Scene::new(&SceneConfig { object: object.clone(), spoil: Vec::new(), visuals: false }, task)?;
+    let start = std::time::Instant::now();
+    let task = new_task(session, args, &object, kind)?;
+    let scene = scene_of(&object, &task)?;
     let world = WorldArgs { object, task: task.clone(), control_freq: 20, seed: args.seed };
     let (demos, recorded) = record::record(&scene, &world, args.n, &session.ui.stage("demos"))?;
     write(out, &demos)?;
@@ -59,6 +54,66 @@ pub fn run(session: &Session, args: &Demos) -> Result<Outcome> {
         "secs": secs, "task": task,
     }));
     Ok(Outcome::Done)
+}
+
+/// A person at the keyboard. What was kept is in the file at every moment.
+fn teleoperate(session: &Session, args: &Demos, out: &Path, object: PathBuf, kind: TaskKind) -> Result<Outcome> {
+    let wanted = Wanted { kind, object: &object, joint: args.joint.as_deref(), scale: args.scale };
+    let there = teleop::go_on(out, &wanted)?;
+    terminal::needed()?;
+    let (kept, world) = match there {
+        Some((demos, world)) => (Some(demos), WorldArgs { seed: args.seed, ..world }),
+        None => {
+            let task = new_task(session, args, &object, kind)?;
+            (None, WorldArgs { object, task, control_freq: 20, seed: args.seed })
+        }
+    };
+    let before = kept.as_ref().map_or(0, |d| d.episodes.len());
+    let scene = scene_of(&world.object, &world.task)?;
+    let console = Console::open()?;
+    let mut person = TeleopSession::new(&scene, world, kept, console.releases);
+    let save = |demos: &hingecast_policy::Demos| match demos.episodes.is_empty() {
+        // The only one was taken back; it was this session's.
+        true => std::fs::remove_file(out).map_err(Failure::io(out)),
+        false => Ok(write(out, demos)?),
+    };
+    let driven = terminal::drive(&mut person, &scene, args.n, save, &session.ui.stage("teleop"));
+    drop(console);
+    let all = person.demos.episodes.len();
+    session.ui.say(&format!("{all} demonstrations in {}, {} of them new", out.display(), all.saturating_sub(before)));
+    let pace = driven?;
+    session.ui.say(&format!(
+        "{} control steps in {:.1} s, {} late by more than 10 ms (worst {:.0} ms); {:.0} pictures a second",
+        pace.steps,
+        pace.secs,
+        pace.late,
+        pace.worst_late_ms,
+        f64::from(pace.pictures) / pace.secs.max(1e-3)
+    ));
+    session.answer(&serde_json::json!({ "demos": out, "kept": all, "new": all.saturating_sub(before), "pace": pace }));
+    Ok(Outcome::Done)
+}
+
+/// Makes the task and says what it is.
+fn new_task(session: &Session, args: &Demos, object: &Path, kind: TaskKind) -> Result<TaskSpec> {
+    let made = make_task(object, kind, args.joint.as_deref(), args.scale)?;
+    let task = made.task;
+    session.ui.say(&format!(
+        "task: {} '{}' of {}, size x {}, held where it is {:.0} mm thick",
+        kind.name(),
+        task.joint,
+        object.display(),
+        task.scale,
+        1e3 * task.width
+    ));
+    if made.worked < made.of {
+        session.ui.say(&format!("doubt: only {} of {} first tries opened it", made.worked, made.of));
+    }
+    Ok(task)
+}
+
+fn scene_of(object: &Path, task: &TaskSpec) -> Result<Scene> {
+    Ok(Scene::new(&SceneConfig { object: object.to_path_buf(), spoil: Vec::new(), visuals: false }, task)?)
 }
 
 /// Lists, plots, replays. Exit 1 when a replay differs.

@@ -3,9 +3,10 @@
 use super::{Outcome, Session};
 use crate::cli::Rollout;
 use hingecast::failure::{Failure, Result};
+use hingecast::report::rollout::{self as report, RolloutReport};
 use hingecast::simulate::record::{WorldArgs, world_of};
 use hingecast::simulate::rollout::{World, pictures, rollout, table, world_of_policy};
-use hingecast::simulate::{object_file, twin_file};
+use hingecast::simulate::{may_write, object_file, twin_file};
 use hingecast::stage::write_json;
 use hingecast_policy::Policy;
 use hingecast_policy::demos::read;
@@ -47,21 +48,27 @@ pub fn run(session: &Session, args: &Rollout) -> Result<Outcome> {
         worlds.push(world(text, &first, spoil, &task)?);
     }
 
+    if let Some(folder) = &args.out {
+        std::fs::create_dir_all(folder).map_err(Failure::io(folder))?;
+        may_write(&folder.join("rollout.json"))?;
+    }
     let start = std::time::Instant::now();
     let mut results = rollout(&policy, &worlds, args.n, args.seed, &session.ui.stage("rollout"))?;
     let secs = start.elapsed().as_secs_f64();
+    let mut page = None;
     if let Some(folder) = &args.out {
-        std::fs::create_dir_all(folder).map_err(Failure::io(folder))?;
         pictures(&policy, &worlds, &mut results, folder, &session.ui.stage("picture"))?;
         write_json(&folder.join("rollout.json"), &results)?;
+        let told = RolloutReport { policy: &args.policy, task: &task, seed: args.seed, secs, results: &results };
+        page = Some(report::write(&told, folder)?);
     }
     session.ui.say(table(&results).trim_end());
     let episodes = args.n * worlds.len();
     session.ui.say(&format!("{episodes} episodes in {secs:.1} s"));
-    if let Some(folder) = &args.out {
-        session.ui.say(&format!("pictures and rollout.json: {}", folder.display()));
+    if let Some(page) = &page {
+        session.ui.say(&format!("report: {}", page.display()));
     }
-    session.answer(&serde_json::json!({ "worlds": results, "secs": secs, "task": task }));
+    session.answer(&serde_json::json!({ "worlds": results, "secs": secs, "task": task, "report": page }));
     Ok(Outcome::Done)
 }
 
