@@ -17,8 +17,9 @@ use hingecast_policy::Demos;
 use hingecast_sim::{Env, Scene, Start, picture};
 use serde::Serialize;
 use std::io::{IsTerminal, Write, stderr, stdin};
+use std::sync::Arc;
 use std::sync::atomic::{AtomicU32, Ordering};
-use std::sync::mpsc::{Receiver, Sender, channel};
+use std::sync::mpsc::{Receiver, RecvTimeoutError, Sender, channel};
 use std::time::{Duration, Instant};
 
 /// 20 Hz.
@@ -119,14 +120,15 @@ fn control(
     mut save: impl FnMut(&Demos) -> Result<()>,
     progress: &Progress,
 ) -> Result<Pace> {
+    let events = Events::listen();
     let begun = Instant::now();
     let mut pace = Pace::default();
     let mut next = begun + STEP;
     while !session.wants_to_quit() && session.demos.episodes.len() < wanted {
         // The painter is gone only when it panicked; the scope tells that.
         let _ = shown.send((session.shown(), session.status()));
-        while event::poll(next.saturating_duration_since(Instant::now())).map_err(lost)? {
-            match event::read().map_err(lost)? {
+        while let Some(event) = events.until(next)? {
+            match event {
                 Event::Key(k) if k.code == KeyCode::Char('c') && k.modifiers.contains(KeyModifiers::CONTROL) => {
                     return Err(Cancelled.into());
                 }
@@ -153,6 +155,44 @@ fn control(
     }
     pace.secs = begun.elapsed().as_secs_f64();
     Ok(pace)
+}
+
+/// Terminal events from a thread of their own: of a terminal that hung up crossterm reads nothing for ever, and the control loop has to
+/// notice the hang-up's signal all the same.
+struct Events {
+    receiver: Receiver<std::io::Result<Event>>,
+    /// The thread ends with it.
+    _listening: Arc<()>,
+}
+
+impl Events {
+    fn listen() -> Self {
+        let ((sender, receiver), listening) = (channel(), Arc::new(()));
+        let wanted = Arc::downgrade(&listening);
+        std::thread::spawn(move || {
+            while wanted.upgrade().is_some() {
+                let event = match event::poll(STEP) {
+                    Ok(false) => continue,
+                    Ok(true) => event::read(),
+                    Err(e) => Err(e),
+                };
+                let failed = event.is_err();
+                if sender.send(event).is_err() || failed {
+                    return;
+                }
+            }
+        });
+        Self { receiver, _listening: listening }
+    }
+
+    /// The next event; `None` when there is none before `deadline`.
+    fn until(&self, deadline: Instant) -> Result<Option<Event>> {
+        match self.receiver.recv_timeout(deadline.saturating_duration_since(Instant::now())) {
+            Ok(event) => event.map(Some).map_err(lost),
+            Err(RecvTimeoutError::Timeout) => Ok(None),
+            Err(RecvTimeoutError::Disconnected) => Err(lost(std::io::ErrorKind::BrokenPipe.into())),
+        }
+    }
 }
 
 /// Draws the newest of what comes until nothing comes any more.
