@@ -6,6 +6,7 @@ mod verbs;
 use clap::Parser;
 use clap::error::{ContextKind, ErrorKind};
 use hingecast::failure::Failure;
+use std::io::Write;
 use std::process::ExitCode;
 
 fn main() -> ExitCode {
@@ -27,7 +28,8 @@ fn refuse(failure: &Failure, json: bool) -> ExitCode {
         let error = serde_json::json!({"error": failure.what, "where": failure.place, "try": failure.hint});
         println!("{error}");
     }
-    eprintln!("{}: {failure}", if failure.cancelled { "stopped" } else { "error" });
+    // Nobody may be left to read it: a terminal that was closed.
+    let _ = writeln!(std::io::stderr(), "{}: {failure}", if failure.cancelled { "stopped" } else { "error" });
     ExitCode::from(if failure.cancelled { 130 } else { 2 })
 }
 
