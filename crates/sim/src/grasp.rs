@@ -8,7 +8,7 @@
 //! closing direction lies along the axis. Elsewhere the wrist turns with the part.
 
 use crate::SimError;
-use crate::object::{self, ObjectJoint, body_pose, bounds, hangs_on};
+use crate::object::{self, ObjectJoint, bounds, hangs_on, write_pose};
 use crate::scene::alone;
 use crate::task::{TABLE, TaskKind, TaskSpec};
 use glam::{DMat3, DQuat, DVec3};
@@ -65,21 +65,37 @@ pub enum Size {
 
 type Probe = MjData<Arc<MjModel>>;
 
+/// The gripper in a probe's model, looked up by name once.
+#[derive(Clone, Copy)]
+struct Hand {
+    body: usize,
+    /// The geom that fingers hang on.
+    palm: usize,
+}
+
+impl Hand {
+    fn of(model: &MjModel) -> Self {
+        let id = |kind, name: &str| model.name_to_id(kind, name).expect("a name in our own gripper");
+        Self { body: id(MjtObjBase::mjOBJ_BODY, "gripper"), palm: id(MjtObjBase::mjOBJ_GEOM, "hand") }
+    }
+
+    fn owns(self, model: &MjModel, geom: usize) -> bool {
+        model.geom_bodyid()[geom] as usize == self.body
+    }
+}
+
 /// Tasks on this object, best first: one per place to hold. Empty when the gripper fits nowhere.
 ///
 /// # Errors
 /// When the model cannot be loaded, nothing moves, or `joint` is not there.
 pub fn candidates(path: &Path, kind: TaskKind, joint: Option<&str>, size: Size) -> Result<Vec<Candidate>, SimError> {
     let data = alone(path, 1.0, Some(GRIPPER))?;
+    let hand = Hand::of(data.model());
     let all = object::joints(data.model());
     let names: Vec<&str> = all.iter().map(|j| j.name.as_str()).collect();
     let place = path.display().to_string();
     if all.is_empty() {
-        return Err(SimError::task(
-            "nothing moves: the model has no hinge and no slide",
-            place,
-            "look at the run's report for parts that were missed, or take another object",
-        ));
+        return Err(SimError::nothing_moves(place));
     }
     if let Some(name) = joint.filter(|n| !names.contains(n)) {
         return Err(SimError::task(
@@ -92,7 +108,7 @@ pub fn candidates(path: &Path, kind: TaskKind, joint: Option<&str>, size: Size) 
     for j in all.iter().filter(|j| joint.is_none_or(|n| n == j.name)) {
         let s = match size {
             Size::Exactly(s) => s,
-            Size::Reachable(factor) => two_digits((factor * reachable_scale(&mut data_at(&data), j)).min(1.0)),
+            Size::Reachable(factor) => two_digits((factor * reachable_scale(&mut data_at(&data), hand, j)).min(1.0)),
         };
         out.extend(at_scale(path, kind, &j.name, s)?);
     }
@@ -113,12 +129,12 @@ fn two_digits(s: f64) -> f64 {
 }
 
 /// At most 1; so that the farthest point of the part neither travels nor stands beyond what the arm does with ease.
-fn reachable_scale(data: &mut Probe, joint: &ObjectJoint) -> f64 {
-    let (closed, open) = ends(data, joint);
+fn reachable_scale(data: &mut Probe, hand: Hand, joint: &ObjectJoint) -> f64 {
+    let (closed, open) = ends(data, hand, joint);
     pose_joint(data, joint, closed);
-    let Some([lo, hi]) = bounds(data, |g| is_object(data.model(), g)) else { return 1.0 };
+    let Some([lo, hi]) = object_bounds(data, hand) else { return 1.0 };
     let part = bounds(data, |g| is_part(data.model(), g, joint)).unwrap_or([lo, hi]);
-    let screw = screw(data, joint);
+    let screw = object::screw(data, joint);
     let motion = screw.motion(0.6 * (open - closed));
     let corner = |k: usize| {
         let pick = |bit: usize, l: f64, h: f64| if k >> bit & 1 == 0 { l } else { h };
@@ -135,12 +151,13 @@ fn at_scale(path: &Path, kind: TaskKind, name: &str, scale: f64) -> Result<Vec<C
     let mut data = alone(path, scale, Some(GRIPPER))?;
     park_gripper(&mut data);
     let Some(joint) = object::joints(data.model()).into_iter().find(|j| j.name == name) else { return Ok(Vec::new()) };
-    let (closed, open) = ends(&mut data, &joint);
+    let hand = Hand::of(data.model());
+    let (closed, open) = ends(&mut data, hand, &joint);
     pose_joint(&mut data, &joint, closed);
-    let Some([low, _]) = bounds(&data, |g| is_object(data.model(), g)) else { return Ok(Vec::new()) };
+    let Some([low, _]) = object_bounds(&data, hand) else { return Ok(Vec::new()) };
     let Some(part) = bounds(&data, |g| is_part(data.model(), g, &joint)) else { return Ok(Vec::new()) };
-    let screw = screw(&mut data, &joint);
-    let search = Search { closed, open, screw, low: low.z, part, joint };
+    let screw = object::screw(&data, &joint);
+    let search = Search { hand, closed, open, screw, low: low.z, part, joint };
     let mut base = TaskSpec::new(kind, name, scale);
     base.part_centre = 0.5 * (part[0] + part[1]);
     base.travel = (open - closed).abs();
@@ -152,10 +169,10 @@ fn at_scale(path: &Path, kind: TaskKind, name: &str, scale: f64) -> Result<Vec<C
 }
 
 /// Closed is the end at which the object is more compact; where both are alike, the one nearer to the recorded zero.
-fn ends(data: &mut Probe, joint: &ObjectJoint) -> (f64, f64) {
+fn ends(data: &mut Probe, hand: Hand, joint: &ObjectJoint) -> (f64, f64) {
     let volume = joint.range.map(|q| {
         pose_joint(data, joint, q);
-        bounds(data, |g| is_object(data.model(), g)).map_or(0.0, |[lo, hi]| {
+        object_bounds(data, hand).map_or(0.0, |[lo, hi]| {
             let size = hi - lo;
             size.x * size.y * size.z
         })
@@ -186,6 +203,7 @@ fn directions() -> Vec<(DVec3, DVec3)> {
 }
 
 struct Search {
+    hand: Hand,
     joint: ObjectJoint,
     closed: f64,
     open: f64,
@@ -342,19 +360,18 @@ impl Search {
         data.com_pos();
         data.collision();
         let model = data.model();
-        let [low, _] = bounds(data, |g| !is_object(model, g)).unwrap_or([DVec3::splat(f64::MAX); 2]);
+        let [low, _] = bounds(data, |g| self.hand.owns(model, g)).unwrap_or([DVec3::splat(f64::MAX); 2]);
         if low.z < self.low + 0.003 {
             return false;
         }
         data.contact().iter().all(|c| {
             let [a, b] = c.geom.map(|g| g.max(0) as usize);
-            let (hand, other) = match (is_object(model, a), is_object(model, b)) {
-                (false, true) => (a, b),
-                (true, false) => (b, a),
+            let (finger, other) = match [a, b].map(|g| self.hand.owns(model, g)) {
+                [true, false] => (a, b),
+                [false, true] => (b, a),
                 _ => return true,
             };
-            let palm = model.id_to_name(MjtObjBase::mjOBJ_GEOM, hand) == Some("hand");
-            let rocking = slack > 0.0 && !palm && is_part(model, other, &self.joint);
+            let rocking = slack > 0.0 && finger != self.hand.palm && is_part(model, other, &self.joint);
             rocking || c.dist > -slack
         })
     }
@@ -379,9 +396,8 @@ fn distinct(sorted: Vec<Candidate>) -> Vec<Candidate> {
     out
 }
 
-fn is_object(model: &MjModel, geom: usize) -> bool {
-    let gripper = model.name_to_id(MjtObjBase::mjOBJ_BODY, "gripper");
-    Some(model.geom_bodyid()[geom] as usize) != gripper
+fn object_bounds(data: &Probe, hand: Hand) -> Option<[DVec3; 2]> {
+    bounds(data, |g| !hand.owns(data.model(), g))
 }
 
 fn is_part(model: &MjModel, geom: usize, joint: &ObjectJoint) -> bool {
@@ -394,23 +410,9 @@ fn pose_joint(data: &mut Probe, joint: &ObjectJoint, q: f64) {
 }
 
 fn place_gripper(data: &mut Probe, pose: &Pose) {
-    let q = data.qpos_mut();
-    q[..3].copy_from_slice(&pose.trans.to_array());
-    q[3..7].copy_from_slice(&[pose.rot.w, pose.rot.x, pose.rot.y, pose.rot.z]);
+    write_pose(&mut data.qpos_mut()[..7], pose);
 }
 
 fn park_gripper(data: &mut Probe) {
     place_gripper(data, &Pose::from_trans(DVec3::new(0.0, 0.0, 50.0)));
-}
-
-/// The joint's motion in the base frame, from where it stands now.
-fn screw(data: &mut Probe, joint: &ObjectJoint) -> Screw {
-    data.kinematics();
-    let pose = body_pose(data, joint.body);
-    let model = data.model();
-    Screw {
-        kind: if joint.slides { JointKind::Prismatic } else { JointKind::Revolute },
-        axis: pose.rotate(DVec3::from(model.jnt_axis()[joint.id])),
-        pivot: pose.apply(DVec3::from(model.jnt_pos()[joint.id])),
-    }
 }

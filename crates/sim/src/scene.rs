@@ -197,12 +197,9 @@ fn spoil(spec: &mut MjSpec, config: &SceneConfig, task: &TaskSpec) -> Result<(),
     let target = Target::find(&mut data, &unscaled, &path.display().to_string())?;
     data.kinematics();
     let joint = &target.joint;
-    let model = data.model();
-    let pose: Pose = object::body_pose(&data, joint.body);
-    let axis = pose.rotate(DVec3::from(model.jnt_axis()[joint.id]));
-    let pivot = pose.apply(DVec3::from(model.jnt_pos()[joint.id]));
     let [mut lo, mut hi] = joint.range;
-    let mut line = Line { axis, pivot };
+    let screw = object::screw(&data, joint);
+    let mut line = Line { axis: screw.axis, pivot: screw.pivot };
     for s in &config.spoil {
         match *s {
             Spoil::Limits(share) if target.closed <= target.open => hi = lo + share * (hi - lo),
@@ -221,7 +218,7 @@ fn spoil(spec: &mut MjSpec, config: &SceneConfig, task: &TaskSpec) -> Result<(),
     let entry = spec.joint_mut(&joint.name).ok_or_else(|| {
         SimError::task("the joint has no name", path.display().to_string(), "give the joint a name in the model file")
     })?;
-    let base = pose.inverse();
+    let base = object::body_pose(&data, joint.body).inverse();
     *entry.axis_mut() = base.rotate(line.axis).to_array();
     *entry.pos_mut() = base.apply(line.pivot).to_array();
     *entry.range_mut() = [lo, hi];
