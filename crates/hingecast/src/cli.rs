@@ -339,8 +339,8 @@ pub struct Rollout {
     /// Episodes in every world.
     #[arg(short, default_value_t = 200, value_name = "N", value_parser = at_least_one)]
     pub n: usize,
-    /// Seed of the episodes.
-    #[arg(long, default_value_t = 0, value_name = "N")]
+    /// Seed of the episodes; that of the demonstrations (0) would begin where they began.
+    #[arg(long, default_value_t = 1, value_name = "N")]
     pub seed: u64,
     /// Folder for rollout.json and a strip of pictures of each kind of end [default: none, only the answer].
     #[arg(long, short, value_name = "FOLDER")]

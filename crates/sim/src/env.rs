@@ -7,8 +7,9 @@
 use crate::SimError;
 use crate::control::{self, ArmState, Goal, N};
 use crate::object::{self, body_pose, matrix, pose_of, write_pose, wxyz};
+use crate::path::SpotPath;
 use crate::scene::Scene;
-use crate::task::{TABLE, TaskKind};
+use crate::task::{CLOSE_FROM, TABLE, TaskKind};
 use glam::{DMat3, DQuat, DVec3};
 use hingecast_geom::pose::quat_from_rotation_vector;
 use hingecast_geom::random::normal;
@@ -114,7 +115,7 @@ impl Env {
         qpos[ids.fingers_qpos[0]] = START_FINGER;
         qpos[ids.fingers_qpos[1]] = -START_FINGER;
         let target = &scene.target;
-        let share = if scene.task.kind == TaskKind::Close { 0.6 + 0.2 * rng.f64() } else { 0.0 };
+        let share = if scene.task.kind == TaskKind::Close { CLOSE_FROM + 0.2 * rng.f64() } else { 0.0 };
         qpos[target.joint.qpos] = target.closed + share * (target.open - target.closed);
         if let Some(at) = ids.free_qpos {
             let base = place * pose_of(&qpos[at..at + 7]);
@@ -259,6 +260,21 @@ impl Env {
         } else {
             Outcome::MovedTooLittle
         }
+    }
+
+    /// How far the grasped spot of the part is from the way on which the joint of `truth` would lead it, m; infinite once the
+    /// simulation has diverged.
+    pub fn off(&self, truth: &SpotPath) -> f64 {
+        if !self.finite {
+            return f64::INFINITY;
+        }
+        let world_from_base = match self.scene.ids.free_qpos {
+            None => self.place,
+            Some(at) => {
+                pose_of(&self.data.qpos()[at..at + 7]) * pose_of(&self.scene.model.qpos0()[at..at + 7]).inverse()
+            }
+        };
+        truth.off(world_from_base.inverse().apply(self.grasp().trans))
     }
 
     /// robomimic's low-dimensional keys: `object` (grasp frame: position, quaternion xyzw; from the gripper to it),

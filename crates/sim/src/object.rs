@@ -165,6 +165,8 @@ pub struct Target {
     pub open: f64,
     /// The grasp frame, fixed to the moving body.
     pub body_from_grasp: Pose,
+    /// The joint as it stands when closed, base frame; the sign is the model's own.
+    pub screw: Screw,
 }
 
 impl Target {
@@ -188,7 +190,8 @@ impl Target {
                 let distance = spot.distance(spot.clamp(lo, hi)) + 0.25 * (0.5 * (lo + hi)).distance(task.part_centre);
                 let body_from_grasp = body_pose(data, part).inverse() * task.grasp;
                 if best.as_ref().is_none_or(|(d, _)| distance < *d) {
-                    best = Some((distance, Self { joint: joint.clone(), closed, open, body_from_grasp }));
+                    let screw = screw(data, &joint);
+                    best = Some((distance, Self { joint: joint.clone(), closed, open, body_from_grasp, screw }));
                 }
             }
         }

@@ -1,7 +1,7 @@
 //! Whole episodes: seeds, replay to the bit, the demonstrator, spoiled objects, a twin with names and zeros of its own.
 
 use hingecast_sim::trial::{demonstrate, make_task};
-use hingecast_sim::{Env, Expert, Outcome, Scene, SceneConfig, Spoil, TaskKind};
+use hingecast_sim::{Env, Expert, Outcome, Scene, SceneConfig, Spoil, SpotPath, TaskKind};
 use std::path::{Path, PathBuf};
 
 fn covered_box() -> PathBuf {
@@ -172,4 +172,40 @@ fn bad_input_is_named_in_three_lines() {
     action[2] = f64::NAN;
     three(env.step(&action).unwrap_err(), "action[2]");
     three(env.set_state(&[0.0; 3]).unwrap_err(), "3");
+}
+
+/// A demonstrator that knows the joint in front of it opens many a wrong one; where the part then is tells them apart.
+#[test]
+fn a_wrong_joint_opens_and_yet_not_as_the_true_one() {
+    let truth = scene(&covered_box(), &covered_box(), &[]);
+    let path = SpotPath::of(&truth);
+    assert_eq!(path.tolerance(), hingecast_sim::path::TOLERANCE);
+    let count = |spoil: &[Spoil]| {
+        let mut env = Env::new(&scene(&covered_box(), &covered_box(), spoil));
+        let ends = (0..10).map(|seed| {
+            let opened = demonstrate(&mut env, seed, |_, _| ()).unwrap() == Outcome::Success;
+            (opened, env.off(&path) <= path.tolerance(), env.off(&path))
+        });
+        ends.collect::<Vec<_>>()
+    };
+    let right = count(&[]);
+    assert!(right.iter().all(|(opened, as_true, _)| opened == as_true), "{right:?}");
+    assert!(right.iter().filter(|(opened, _, off)| *opened && *off < 1e-3).count() >= 9, "{right:?}");
+    // 2 degrees stay within half a pad; 30 degrees do not, though the lid comes up.
+    assert!(count(&[Spoil::Axis(2.0)]).iter().filter(|e| e.1).count() >= 9);
+    for spoil in [Spoil::Axis(30.0), Spoil::Limits(0.5), Spoil::Pivot(30.0), Spoil::Edge] {
+        let ends = count(&[spoil]);
+        assert!(ends.iter().all(|e| !e.1), "{spoil:?}: {ends:?}");
+        if spoil != Spoil::Edge {
+            assert!(ends.iter().filter(|e| e.0).count() >= 8, "{spoil:?}: {ends:?}");
+        }
+    }
+}
+
+/// The pads' width is written in two places: in the model of the hand and as the tolerance.
+#[test]
+fn the_tolerance_is_half_a_pad() {
+    let scene = scene(&covered_box(), &covered_box(), &[]);
+    let pad = scene.model.name_to_id(mujoco_rs::prelude::MjtObjBase::mjOBJ_GEOM, "left_pad").unwrap();
+    assert_eq!(scene.model.geom_size()[pad][0], hingecast_sim::path::TOLERANCE);
 }
