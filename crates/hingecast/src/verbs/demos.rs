@@ -3,12 +3,12 @@
 use super::{Outcome, Session};
 use crate::cli::Demos;
 use hingecast::failure::{Failure, Result};
-use hingecast::simulate::record::{self, WorldArgs};
+use hingecast::simulate::record;
 use hingecast::simulate::{object_file, replay, twin_file};
 use hingecast_geom::ply::write_whole;
 use hingecast_policy::demos::{read, write};
+use hingecast_sim::TaskKind;
 use hingecast_sim::trial::make_task;
-use hingecast_sim::{Scene, SceneConfig, TaskKind};
 use std::path::Path;
 
 pub fn run(session: &Session, args: &Demos) -> Result<Outcome> {
@@ -39,9 +39,7 @@ pub fn run(session: &Session, args: &Demos) -> Result<Outcome> {
     if made.worked < made.of {
         session.ui.say(&format!("doubt: only {} of {} first tries opened it", made.worked, made.of));
     }
-    let scene = Scene::new(&SceneConfig { object: object.clone(), spoil: Vec::new(), visuals: false }, task)?;
-    let world = WorldArgs { object, task: task.clone(), control_freq: 20, seed: args.seed };
-    let (demos, recorded) = record::record(&scene, &world, args.n, &session.ui.stage("demos"))?;
+    let (demos, recorded) = record::record_on(&object, task, args.n, args.seed, &session.ui.stage("demos"))?;
     write(out, &demos)?;
     let secs = start.elapsed().as_secs_f64();
     let thrown: usize = recorded.thrown_away.values().sum();
