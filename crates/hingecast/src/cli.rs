@@ -362,9 +362,10 @@ pub struct Experiment {
     /// Recordings to take instead of rendering: <FOLDER>/<object>; what is not there is rendered [default: none].
     #[arg(long, value_name = "FOLDER")]
     pub recordings: Option<PathBuf>,
-    /// Runs of `hingecast build` to take instead of building: <FOLDER>/<object>; what is not there is built [default: none].
+    /// Runs of `hingecast build` to take instead of building: <FOLDER>/<object>, for the twin whose method they have; may be
+    /// repeated; what is not there is built [default: none].
     #[arg(long, value_name = "FOLDER")]
-    pub runs: Option<PathBuf>,
+    pub runs: Vec<PathBuf>,
     /// A world besides the true object: twin, track (the classical method's twin), axis=DEGREES, pivot=MM (simulated), limits=SHARE,
     /// edge, or back (a policy from the twin on the true object); may be repeated [default: twin, track, axis=3, axis=10, axis=30,
     /// pivot=3, pivot=10, pivot=30, limits=0.5, edge, back].

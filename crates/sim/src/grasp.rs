@@ -225,6 +225,8 @@ impl Search {
         let ((cu, hu), (cv, hv), (ca, ha)) = (extent(closing), extent(side), extent(approach));
         let step = (2.0 * hu.max(hv) / 48.0).max(0.004);
         let (nu, nv) = ((hu / step).ceil() as i32, (hv / step).ceil() as i32);
+        // A place that was judged before may have left the part half open.
+        pose_joint(data, &self.joint, self.closed);
         // First pass: where would the fingers meet the part on both sides?
         let mut hits: Vec<(i32, i32, DVec3, f64)> = Vec::new();
         for u in -nu..=nu {

@@ -309,11 +309,12 @@ impl Cast<'_> {
 
     fn build(&mut self, recording: &Path, classical: bool) -> Result<Model> {
         let (session, plan) = (self.session, self.plan);
-        if let Some(run) = plan.args.runs.as_ref().map(|r| r.join(self.name)).filter(|r| r.is_dir() && !classical) {
+        let (kind, config) = if classical { ("track", &plan.track) } else { ("build", &plan.twin) };
+        let finished = |run: &PathBuf| run.join("twin/robot.xml").is_file() && method_of(run) == Some(config.method);
+        if let Some(run) = plan.args.runs.iter().map(|r| r.join(self.name)).find(finished) {
             let stamps: Vec<String> = RunFolder::open(&run)?.record.stages.into_iter().map(|s| s.stamp).collect();
             return Ok(Model { file: twin_file(&run)?, stamp: hingecast::stage::stamp(&[&stamps]) });
         }
-        let (kind, config) = if classical { ("track", &plan.track) } else { ("build", &plan.twin) };
         let run = self.root.join(if classical { "run_track" } else { "run" });
         let fingerprint = Recording::open(recording)?.fingerprint()?;
         let stamp = self.steps.step(kind, kind, &[&fingerprint, config], &run.join("twin/robot.xml"), || {
@@ -431,4 +432,11 @@ impl Cast<'_> {
         let made = self.world("back", truth, &[], truth, &trained, "twin", self.plan.args.episodes);
         Ok(self.caught(made)?.map(|(episodes, _)| (episodes, None)))
     }
+}
+
+/// By what method a run was built.
+fn method_of(run: &Path) -> Option<Method> {
+    let text = std::fs::read_to_string(run.join("config.toml")).ok()?;
+    let table: toml::Table = text.parse().ok()?;
+    table.get("method")?.clone().try_into().ok()
 }
