@@ -23,8 +23,23 @@ const GRIPPER: &str = include_str!("../assets/gripper.xml");
 const WIDEST: f64 = 0.07;
 /// Thinner things than a sheet of card are not pinched reliably.
 const THINNEST: f64 = 0.003;
+/// Half of what the hand opens, m: where the pads' inner faces are then.
+const HALF_OPEN: f64 = 0.04;
+/// Points of a finger's inner face, wide open, in the grip's frame: across, along the approach, from the middle, m (gripper.xml).
+const FINGER: [[f64; 3]; 8] = [
+    [-0.0085, 0.0088, HALF_OPEN],
+    [0.0085, 0.0088, HALF_OPEN],
+    [-0.0085, -0.0088, HALF_OPEN],
+    [0.0085, -0.0088, HALF_OPEN],
+    [-0.0105, -0.02, 0.046],
+    [0.0105, -0.02, 0.046],
+    [-0.0105, -0.045, 0.046],
+    [0.0105, -0.045, 0.046],
+];
 /// How deep the pads' middle may sit below the surface that is met first, m. The pads reach 9 mm farther.
 const DEPTHS: [f64; 3] = [0.008, 0.016, 0.024];
+/// The same for small pieces, m: enough to hold.
+const TIPS: f64 = 0.003;
 /// How far the hand may lean back from pointing down when it comes from a side, rad. The sixth joint ends at 3.75 rad, 0.8 beyond
 /// the start; a level hand needs the fifth joint at its stop.
 const TILTS: [f64; 5] = [0.5, 0.75, 1.0, 1.3, FRAC_PI_2];
@@ -227,7 +242,8 @@ impl Search {
         let (nu, nv) = ((hu / step).ceil() as i32, (hv / step).ceil() as i32);
         // A place that was judged before may have left the part half open.
         pose_joint(data, &self.joint, self.closed);
-        // First pass: where would the fingers meet the part on both sides?
+        // First pass: where would the fingers meet the part on both sides? Handles and knobs are smaller than the grid's step.
+        let mut places = self.details(data, approach, closing);
         let mut hits: Vec<(i32, i32, DVec3, f64)> = Vec::new();
         for u in -nu..=nu {
             for v in -nv..=nv {
@@ -238,10 +254,13 @@ impl Search {
                 }
             }
         }
-        let mut out = Vec::new();
         for &(u, v, point, width) in &hits {
             // A place whose neighbours could be held as well forgives errors.
             let room = hits.iter().filter(|h| (h.0 - u).abs() <= 3 && (h.1 - v).abs() <= 3).count() as f64 / 49.0;
+            places.push((point, width, room));
+        }
+        let mut out = Vec::new();
+        for (point, width, room) in places {
             let grasp = Pose::from_mat3_trans(DMat3::from_cols(closing.cross(approach), closing, approach), point);
             for turn_wrist in self.wrists(closing) {
                 if let Some(c) = self.judge(data, &grasp, width, room, turn_wrist, base) {
@@ -256,15 +275,44 @@ impl Search {
     fn pinch(&self, data: &mut Probe, from: DVec3, approach: DVec3, closing: DVec3) -> Option<(DVec3, f64)> {
         let met = self.ray(data, from, approach)?;
         // Deepest first: a better hold, where there is one.
-        DEPTHS.iter().rev().find_map(|depth| {
-            let at = from + approach * (met + depth);
-            let reach = 0.5 * 0.08;
-            let near = self.ray(data, at - closing * reach, closing)?;
-            let far = self.ray(data, at + closing * reach, -closing)?;
-            let width = 2.0 * reach - near - far;
-            let middle = at + closing * (0.5 * (near - far));
-            ((THINNEST..=WIDEST).contains(&width)).then_some((middle, width))
-        })
+        DEPTHS.iter().rev().find_map(|depth| self.thickness(data, from + approach * (met + depth), closing))
+    }
+
+    /// The middle of the part between the fingers if they close about `at`, and its width.
+    fn thickness(&self, data: &mut Probe, at: DVec3, closing: DVec3) -> Option<(DVec3, f64)> {
+        let near = self.ray(data, at - closing * HALF_OPEN, closing)?;
+        let far = self.ray(data, at + closing * HALF_OPEN, -closing)?;
+        let width = 2.0 * HALF_OPEN - near - far;
+        let middle = at + closing * (0.5 * (near - far));
+        ((THINNEST..=WIDEST).contains(&width)).then_some((middle, width))
+    }
+
+    /// Places on the part's own small pieces (bars, knobs): in their middle, and just below the face that is met first, where the tips
+    /// of the fingers need less room behind.
+    fn details(&self, data: &mut Probe, approach: DVec3, closing: DVec3) -> Vec<(DVec3, f64, f64)> {
+        let side = approach.cross(closing);
+        let pieces: Vec<[DVec3; 2]> = {
+            let model = data.model();
+            let own = (0..model.ffi().ngeom as usize).filter(|&g| is_part(model, g, &self.joint));
+            own.filter_map(|g| bounds(data, |other| other == g)).collect()
+        };
+        let mut out = Vec::new();
+        for [lo, hi] in pieces {
+            let (centre, half) = (0.5 * (lo + hi), 0.5 * (hi - lo));
+            if 2.0 * half.dot(closing.abs()) > WIDEST {
+                continue;
+            }
+            let deep = half.dot(approach.abs());
+            for depth in [deep, TIPS] {
+                let at = centre + approach * (depth - deep);
+                let Some((middle, width)) = self.thickness(data, at, closing) else { continue };
+                // How far to both sides could it be held as well?
+                let beside = [-0.012, -0.008, -0.004, 0.004, 0.008, 0.012];
+                let held = beside.iter().filter(|b| self.thickness(data, at + side * **b, closing).is_some()).count();
+                out.push((middle, width, held as f64 / beside.len() as f64));
+            }
+        }
+        out
     }
 
     /// Distance to the moving part, if it is the first thing met. A start inside a solid meets nothing.
@@ -297,6 +345,9 @@ impl Search {
             if !self.fits(data, &pose, 0.0) {
                 return None;
             }
+        }
+        if !self.closes(data, grasp, width) {
+            return None;
         }
         let span = self.open - self.closed;
         for share in ALONG {
@@ -353,6 +404,21 @@ impl Search {
         // Doors swing more outwards than sideways: the larger component decides, as rounding to quarter turns does.
         let towards = |yaw: f64| -(DQuat::from_rotation_z(yaw) * way).x;
         fine.max_by(|a, b| towards(*a).total_cmp(&towards(*b)))
+    }
+
+    /// Nothing but the part stands in the fingers' way when they close: rays from the corners of pads and shafts inwards, as far as
+    /// the part's surface. A lip of the case behind a door's edge would stop one finger, and the hand would pull at the case.
+    fn closes(&self, data: &mut Probe, grasp: &Pose, width: f64) -> bool {
+        FINGER.iter().all(|&[side, along, inner]| {
+            [1.0, -1.0].into_iter().all(|finger| {
+                let from = grasp.apply(DVec3::new(side, finger * inner, along));
+                let inwards = grasp.rotate(DVec3::new(0.0, -finger, 0.0));
+                let groups = [1, 1, 1, 1, 1, 0];
+                let way = HALF_OPEN - 0.5 * width;
+                let (met, distance) = data.ray(&from.to_array(), &inwards.to_array(), Some(&groups), true, None, None);
+                met.is_none_or(|g| distance > way || is_part(data.model(), g, &self.joint))
+            })
+        })
     }
 
     /// No contact of the hand deeper than `slack`, and the hand above the table. With slack, fingers may touch the part itself.
