@@ -57,7 +57,7 @@ const HIGHEST: f64 = 0.4;
 const LARGEST: f64 = 0.75;
 /// Where the middle of the way shall be on the table, m from its centre towards the far side: in front of the arm with room on
 /// both sides. The covered box comes out at simulation.md's x 0..0.06.
-const MIDDLE: f64 = 0.0375;
+const MIDDLE: f64 = 0.0305;
 
 /// A hand that leans stands between the arm and the grasp: so much farther away the object is put when it lies level, m.
 const BEHIND: f64 = 0.12;

@@ -209,3 +209,46 @@ fn the_tolerance_is_half_a_pad() {
     let pad = scene.model.name_to_id(mujoco_rs::prelude::MjtObjBase::mjOBJ_GEOM, "left_pad").unwrap();
     assert_eq!(scene.model.geom_size()[pad][0], hingecast_sim::path::TOLERANCE);
 }
+
+/// Whatever the file's zero and unit of angles are: a wrong hinge moves the part otherwise, but closed it stands where it stood.
+#[test]
+fn a_spoiled_joint_leaves_the_closed_part_where_it_was() {
+    let dir = tempfile::tempdir().unwrap();
+    let twin = a_twin(dir.path(), 0.06);
+    let degrees = dir.path().join("degrees.xml");
+    let text = std::fs::read_to_string(&twin).unwrap();
+    let text = text.replace("angle=\"radian\"", "angle=\"degree\"").replace("-0.785 0.785", "-44.97718691 44.97718691");
+    std::fs::write(&degrees, text).unwrap();
+    for file in [covered_box(), twin, degrees] {
+        let right = scene(&file, &covered_box(), &[]);
+        let (mut a, path) = (Env::new(&right), SpotPath::of(&right));
+        a.reset(3);
+        for (spoil, axis_deg, pivot_mm) in [
+            (Spoil::Axis(30.0), 30.0, 0.0),
+            (Spoil::Pivot(10.0), 0.0, 10.0),
+            (Spoil::Limits(0.5), 0.0, 0.0),
+            (Spoil::Edge, 180.0, 120.0),
+        ] {
+            let wrong = scene(&file, &covered_box(), &[spoil]);
+            let mut b = Env::new(&wrong);
+            b.reset(3);
+            let (p, q) = (a.grasp(), b.grasp());
+            assert!(
+                p.trans.distance(q.trans) < 1e-6 && (p.rot.inverse() * q.rot).w.abs() > 1.0 - 1e-9,
+                "{spoil:?} {file:?}"
+            );
+            let this = SpotPath::of(&wrong);
+            assert!(
+                (this.screw.axis.angle_between(path.screw.axis).to_degrees() - axis_deg).abs() < 1e-4,
+                "{spoil:?} {file:?}"
+            );
+            let off = 1e3 * this.screw.distance(path.screw.foot(path.spot));
+            assert!(
+                (off - pivot_mm).abs() < 12.0 * f64::from(u8::from(spoil == Spoil::Edge)) + 1e-3,
+                "{spoil:?} {file:?}: {off}"
+            );
+            let share = if spoil == Spoil::Limits(0.5) { 0.5 } else { 1.0 };
+            assert!((this.travel / path.travel - share).abs() < 1e-6, "{spoil:?} {file:?}");
+        }
+    }
+}
