@@ -47,6 +47,9 @@ fn panel(
         .y_label_formatter(&|v: &f64| format!("{v:.0}"))
         .light_line_style(WHITE)
         .draw()?;
+    // What `as true` forgives: the axis is another distance, but of the same kind.
+    let forgiven = 1e3 * hingecast_sim::path::TOLERANCE;
+    chart.draw_series([PathElement::new([(forgiven, 0.0), (forgiven, 100.0)], BLACK.mix(0.3))])?;
     let mut objects: Vec<&str> = rows.iter().map(|r| r.object.as_str()).collect();
     objects.dedup();
     for (k, object) in objects.iter().enumerate() {

@@ -115,12 +115,14 @@ pub fn run(session: &Session, args: &cli::Experiment) -> Result<Outcome> {
     std::fs::create_dir_all(&args.out).map_err(Failure::io(&args.out))?;
     let mut experiment = Experiment { settings: plan.settings(), demonstrated: Vec::new(), rows: Vec::new() };
     let mut clock = Clock::new(plan.steps(), names.len());
-    for name in &names {
+    for argument in &names {
         clock.next_object();
-        let root = args.out.join(name);
+        // An object that was given by its path has the name of its folder.
+        let name = Path::new(argument).file_name().map_or(argument.clone(), |n| n.to_string_lossy().into_owned());
+        let root = args.out.join(&name);
         std::fs::create_dir_all(&root).map_err(Failure::io(&root))?;
-        let steps = Steps { ui: &session.ui, object: name, ledger: Ledger::open(&root), clock: &mut clock };
-        let mut cast = Cast { session, plan: &plan, name, root, steps, demonstrated: Vec::new() };
+        let steps = Steps { ui: &session.ui, object: &name, ledger: Ledger::open(&root), clock: &mut clock };
+        let mut cast = Cast { session, plan: &plan, argument, name: &name, root, steps, demonstrated: Vec::new() };
         let rows = cast.rows()?;
         experiment.demonstrated.extend(cast.demonstrated);
         experiment.rows.extend(rows);
@@ -175,6 +177,8 @@ type Maybe<T> = std::result::Result<T, String>;
 struct Cast<'a> {
     session: &'a Session,
     plan: &'a Plan<'a>,
+    /// As on the command line, and as in the table.
+    argument: &'a str,
     name: &'a str,
     root: PathBuf,
     steps: Steps<'a>,
@@ -258,7 +262,7 @@ impl Cast<'_> {
 
     /// The true object for the simulator: as it is, or imported where the simulator cannot load it.
     fn object(&mut self) -> Result<Model> {
-        let source = ArticulatedObject::resolve(self.name)?;
+        let source = ArticulatedObject::resolve(self.argument)?;
         if let Ok(file) = object::model_file(&source) {
             let file = file.canonicalize().map_err(Failure::io(&file))?;
             let text = std::fs::read(&file).map_err(Failure::io(&file))?;
@@ -284,9 +288,9 @@ impl Cast<'_> {
             return Ok(Some(path));
         }
         let path = self.root.join("recording");
-        let (session, name, config) = (self.session, self.name, &self.plan.synth);
-        self.steps.step("record", "record", &[&self.name, config], &path.join("transforms.json"), || {
-            bench::record_once(session, name, config, &path)
+        let (session, argument, config) = (self.session, self.argument, &self.plan.synth);
+        self.steps.step("record", "record", &[&argument, config], &path.join("transforms.json"), || {
+            bench::record_once(session, argument, config, &path)
         })?;
         Ok(Some(path))
     }
