@@ -170,6 +170,9 @@ struct Trained {
     stamps: Vec<String>,
 }
 
+/// Of each training seed's policy.
+type Episodes = Vec<Vec<EpisodeResult>>;
+
 /// Or why not.
 type Maybe<T> = std::result::Result<T, String>;
 
@@ -378,7 +381,7 @@ impl Cast<'_> {
         trained: &Trained,
         on: &str,
         n: usize,
-    ) -> Result<(Vec<Vec<EpisodeResult>>, TwinError)> {
+    ) -> Result<(Episodes, TwinError)> {
         let scene_of = |model: &Model, spoil: &[Spoil]| {
             let config = SceneConfig { object: model.file.clone(), spoil: spoil.to_vec(), visuals: false };
             Scene::new(&config, &trained.task)
@@ -419,11 +422,7 @@ impl Cast<'_> {
     }
 
     /// A policy from the twin on the true object.
-    fn back(
-        &mut self,
-        truth: &Model,
-        twin: &Maybe<Model>,
-    ) -> Result<Maybe<(Vec<Vec<EpisodeResult>>, Option<TwinError>)>> {
+    fn back(&mut self, truth: &Model, twin: &Maybe<Model>) -> Result<Maybe<(Episodes, Option<TwinError>)>> {
         let twin = match twin {
             Ok(twin) => twin,
             Err(why) => return Ok(Err(why.clone())),
