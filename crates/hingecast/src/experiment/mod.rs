@@ -11,6 +11,7 @@ pub mod table;
 
 use crate::failure::{Failure, Result};
 use crate::simulate::rollout::{EpisodeResult, compare};
+use hingecast_geom::folder::may_become;
 use hingecast_policy::statistics::{Comparison, wilson};
 use hingecast_sim::{Outcome, Spoil, SpotPath};
 use serde::{Deserialize, Serialize};
@@ -184,12 +185,7 @@ impl Experiment {
     /// # Errors
     /// The folder holds something else.
     pub fn may_become(folder: &Path) -> Result<()> {
-        let holds_other = !folder.join("experiment.json").is_file()
-            && std::fs::read_dir(folder).is_ok_and(|mut entries| entries.next().is_some());
-        if holds_other {
-            let hint = "give a new folder: hingecast experiment -o FOLDER";
-            return Err(Failure::new("the folder holds something else", folder.display().to_string(), hint));
-        }
-        Ok(())
+        let hint = "give a new folder: hingecast experiment -o FOLDER";
+        Ok(may_become("experiment's folder", folder, &["experiment.json"], hint)?)
     }
 }

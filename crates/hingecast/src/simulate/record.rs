@@ -61,7 +61,8 @@ fn record(scene: &Scene, args: &WorldArgs, n: usize, progress: &Progress) -> Res
     let mut thrown_away: BTreeMap<Outcome, usize> = BTreeMap::new();
     let mut attempts = 0;
     while episodes.len() < n {
-        if attempts > 4 * n + 4 * BLOCK {
+        // Enough attempts to know; waiting for the last of `n` would take as long again.
+        if attempts >= 4 * BLOCK && 4 * episodes.len() < attempts {
             let ends: Vec<String> = thrown_away.iter().map(|(o, k)| format!("{k} {}", outcome_name(*o))).collect();
             return Err(Failure::new(
                 format!("the demonstrator succeeded in only {} of {attempts} attempts", episodes.len()),
