@@ -2,6 +2,7 @@
 
 use clap::{Args, Parser, Subcommand};
 use hingecast::config::{Method, Preset};
+use hingecast::import_object::ImportConfig;
 use std::path::PathBuf;
 
 /// What a newcomer types first.
@@ -60,6 +61,8 @@ pub enum Verb {
     Train(Train),
     /// Run a policy in seeded episodes on the true object, on its twin and on spoiled ones; compare in pairs.
     Rollout(Rollout),
+    /// Ask what a twin is worth: policies trained on the object act on its twins and on spoiled ones, and back; one table, one plot.
+    Experiment(Experiment),
     /// Record, build and evaluate a suite of objects; print the table of errors and times.
     Bench(Bench),
     /// Say what this machine has and lacks.
@@ -143,10 +146,10 @@ pub struct ImportObject {
     pub out: PathBuf,
     /// All lengths times this. The simulator scales by itself what its arm cannot reach; leave it when twins of the same
     /// recordings shall fit.
-    #[arg(long, default_value_t = 1.0, value_name = "FACTOR")]
+    #[arg(long, default_value_t = ImportConfig::default().scale, value_name = "FACTOR")]
     pub scale: f64,
     /// Density of all parts, kg/m^3.
-    #[arg(long, default_value_t = 600.0, value_name = "DENSITY")]
+    #[arg(long, default_value_t = ImportConfig::default().density, value_name = "DENSITY")]
     pub density: f64,
 }
 
@@ -344,12 +347,60 @@ pub struct Rollout {
     /// Episodes in every world.
     #[arg(short, default_value_t = 200, value_name = "N", value_parser = at_least_one)]
     pub n: usize,
-    /// Seed of the episodes.
-    #[arg(long, default_value_t = 0, value_name = "N")]
+    /// Seed of the episodes; that of the demonstrations (0) would begin where they began.
+    #[arg(long, default_value_t = 1, value_name = "N")]
     pub seed: u64,
     /// Folder for the report: index.html, rollout.json, a strip of pictures of each kind of end [default: none, only the answer].
     #[arg(long, short, value_name = "FOLDER")]
     pub out: Option<PathBuf>,
+}
+
+#[derive(Args, Debug)]
+pub struct Experiment {
+    /// Object names, `ours` (objects/), `real` ($HINGECAST_DATA) or `all`.
+    #[arg(default_values_t = ["covered_box", "microwave", "cabinet_two_door", "three_drawers"].map(String::from))]
+    pub objects: Vec<String>,
+    /// Folder to write: experiment.md, .csv, .json and .svg, and a folder of each object with all that was made on the way. Run
+    /// again to go on.
+    #[arg(long, short)]
+    pub out: PathBuf,
+    /// Recordings to take instead of rendering: <FOLDER>/<object>; what is not there is rendered [default: none].
+    #[arg(long, value_name = "FOLDER")]
+    pub recordings: Option<PathBuf>,
+    /// Runs of `hingecast build` to take instead of building: <FOLDER>/<object>, for the twin whose method they have; may be
+    /// repeated; what is not there is built [default: none].
+    #[arg(long, value_name = "FOLDER")]
+    pub runs: Vec<PathBuf>,
+    /// A world besides the true object: twin, track (the classical method's twin), axis=DEGREES, pivot=MM (simulated), limits=SHARE,
+    /// edge, or back (a policy from the twin on the true object); may be repeated [default: twin, track, axis=3, axis=10, axis=30,
+    /// pivot=3, pivot=10, pivot=30, limits=0.5, edge, back].
+    #[arg(long = "world", value_name = "NAME")]
+    pub worlds: Vec<String>,
+    /// Demonstrations on each object, and on each twin for `back`.
+    #[arg(short, long, default_value_t = 300, value_name = "N", value_parser = at_least_one)]
+    pub demos: usize,
+    /// Episodes of each policy on the true object, on twins and for `back`.
+    #[arg(short, long, default_value_t = 200, value_name = "N", value_parser = at_least_one)]
+    pub episodes: usize,
+    /// Episodes of each policy on each spoiled object, at most as many [default: as --episodes].
+    #[arg(long, value_name = "N", value_parser = at_least_one)]
+    pub spoiled_episodes: Option<usize>,
+    /// Policies trained on the same demonstrations, with seeds 0, 1, ...
+    #[arg(long, default_value_t = 3, value_name = "N", value_parser = at_least_one)]
+    pub train_seeds: usize,
+    /// Preset of the policies, as in `train`.
+    #[arg(long, default_value = "bc-rnn-fast", value_parser = ["bc-rnn-fast", "bc-rnn", "bc"])]
+    pub policy: String,
+    /// One setting of the training, for instance `steps=3000`; may be repeated [default: those of the preset].
+    #[arg(long = "policy-set", value_name = "KEY=VALUE")]
+    pub policy_set: Vec<String>,
+    #[command(flatten)]
+    pub synth: SynthSettings,
+    #[command(flatten)]
+    pub build: BuildSettings,
+    /// Seed of cameras, play and noise of the recordings.
+    #[arg(long, default_value_t = 0, value_name = "N")]
+    pub recording_seed: u64,
 }
 
 #[cfg(test)]

@@ -34,6 +34,12 @@ pub struct ImportConfig {
     pub density: f64,
 }
 
+impl Default for ImportConfig {
+    fn default() -> Self {
+        Self { scale: 1.0, density: 600.0 }
+    }
+}
+
 #[derive(Clone, Debug, Serialize)]
 pub struct Imported {
     pub parts: usize,

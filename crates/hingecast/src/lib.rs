@@ -2,6 +2,8 @@
 
 pub mod config;
 pub mod eval;
+#[cfg(feature = "mujoco")]
+pub mod experiment;
 pub mod failure;
 pub mod import_object;
 pub mod pipeline;

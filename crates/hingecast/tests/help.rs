@@ -4,7 +4,7 @@ mod common;
 
 use common::hingecast;
 
-const VERBS: [&str; 13] = [
+const VERBS: [&str; 14] = [
     "demo",
     "synth",
     "import",
@@ -16,6 +16,7 @@ const VERBS: [&str; 13] = [
     "demos",
     "train",
     "rollout",
+    "experiment",
     "bench",
     "doctor",
 ];

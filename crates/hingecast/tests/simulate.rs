@@ -36,6 +36,10 @@ fn a_policy_is_rolled_out_in_pairs_and_its_episodes_are_drawn() {
     assert_eq!(worlds.len(), 2);
     assert_eq!((&worlds[0]["name"], &worlds[1]["name"]), (&"true".into(), &"edge".into()));
     assert!(worlds[0]["against_first"].is_null() && worlds[1]["against_first"]["interval"].is_array(), "{one}");
+    // On the true object both ways of counting agree; on the wrong edge nothing opens as it should.
+    assert_eq!(worlds[0]["as_true"], worlds[0]["successes"], "{one}");
+    assert_eq!(worlds[1]["as_true"], 0, "{one}");
+    assert!(worlds[1]["as_true_against_first"]["interval"].is_array(), "{one}");
     let seeds = |w: &serde_json::Value| -> Vec<u64> {
         w["results"].as_array().unwrap().iter().map(|r| r["seed"].as_u64().unwrap()).collect()
     };

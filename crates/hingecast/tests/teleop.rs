@@ -107,8 +107,9 @@ impl Typist {
 
 /// Where the held spot goes when the lid opens.
 fn tangent(env: &Env) -> DVec3 {
-    let (axis, point) = env.axis();
-    axis.cross(env.grasp().trans - point).normalize() * (env.scene.target.open - env.scene.target.closed).signum()
+    let screw = env.screw();
+    screw.axis.cross(env.grasp().trans - screw.pivot).normalize()
+        * (env.scene.target.open - env.scene.target.closed).signum()
 }
 
 fn world() -> (Scene, WorldArgs) {

@@ -1,6 +1,7 @@
 //! Loads a model, drives every joint over its range, lets it rest for two seconds, and notes what goes wrong
 //! (metrics.md, "Simulator").
 
+use crate::object::joint_range;
 use crate::{SimError, log};
 use mujoco_rs::prelude::*;
 use serde::{Deserialize, Serialize};
@@ -94,10 +95,7 @@ pub fn check_file(path: &Path, config: &CheckConfig) -> Result<FileCheck, SimErr
 }
 
 fn try_model(path: &Path, config: &CheckConfig) -> Result<FileCheck, SimError> {
-    let model = MjModel::from_xml(path).map_err(|e| SimError::Load {
-        path: path.display().to_string(),
-        what: e.to_string().lines().collect::<Vec<_>>().join("; "),
-    })?;
+    let model = MjModel::from_xml(path).map_err(|e| SimError::load(path, e))?;
     let mut check = FileCheck {
         file: path.file_name().unwrap_or_default().to_string_lossy().into_owned(),
         bodies: model.ffi().nbody as usize,
@@ -141,8 +139,7 @@ fn sweep(model: &MjModel, joint: usize, config: &CheckConfig, all_finite: &mut b
         MjtJoint::mjJNT_SLIDE => config.slide_speed,
         _ => return None,
     };
-    let limited = model.jnt_limited()[joint];
-    let range = if limited { model.jnt_range()[joint] } else { [0.0, std::f64::consts::TAU] };
+    let range = joint_range(model, joint);
     let mut data = MjData::new(model);
     let nv = model.ffi().nv as usize;
     let dof = model.jnt_dofadr()[joint] as usize;

@@ -10,13 +10,14 @@ pub use moment::Moment;
 
 use crate::SimError;
 use crate::control::{self, ArmState, Goal, N};
-use crate::object::{body_pose, matrix};
+use crate::object::{self, body_pose, matrix, pose_of, write_pose, wxyz};
+use crate::path::SpotPath;
 use crate::scene::Scene;
-use crate::task::{TABLE, TaskKind};
+use crate::task::{CLOSE_FROM, TABLE, TaskKind};
 use glam::{DMat3, DQuat, DVec3};
-use hingecast_geom::Pose;
 use hingecast_geom::pose::quat_from_rotation_vector;
 use hingecast_geom::random::normal;
+use hingecast_geom::{Pose, Screw};
 use mujoco_rs::prelude::*;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
@@ -118,12 +119,11 @@ impl Env {
         qpos[ids.fingers_qpos[0]] = START_FINGER;
         qpos[ids.fingers_qpos[1]] = -START_FINGER;
         let target = &scene.target;
-        let share = if scene.task.kind == TaskKind::Close { 0.6 + 0.2 * rng.f64() } else { 0.0 };
+        let share = if scene.task.kind == TaskKind::Close { CLOSE_FROM + 0.2 * rng.f64() } else { 0.0 };
         qpos[target.joint.qpos] = target.closed + share * (target.open - target.closed);
         if let Some(at) = ids.free_qpos {
-            let base = place * Pose::new(quat(&qpos[at + 3..at + 7]), DVec3::from_slice(&qpos[at..at + 3]));
-            qpos[at..at + 3].copy_from_slice(&base.trans.to_array());
-            qpos[at + 3..at + 7].copy_from_slice(&wxyz(base.rot));
+            let base = place * pose_of(&qpos[at..at + 7]);
+            write_pose(&mut qpos[at..at + 7], &base);
         }
         self.begin(place);
     }
@@ -266,6 +266,21 @@ impl Env {
         }
     }
 
+    /// How far the grasped spot of the part is from the way on which the joint of `truth` would lead it, m; infinite once the
+    /// simulation has diverged.
+    pub fn off(&self, truth: &SpotPath) -> f64 {
+        if !self.finite {
+            return f64::INFINITY;
+        }
+        let world_from_base = match self.scene.ids.free_qpos {
+            None => self.place,
+            Some(at) => {
+                pose_of(&self.data.qpos()[at..at + 7]) * pose_of(&self.scene.model.qpos0()[at..at + 7]).inverse()
+            }
+        };
+        truth.off(world_from_base.inverse().apply(self.grasp().trans))
+    }
+
     /// robomimic's low-dimensional keys: `object` (grasp frame: position, quaternion xyzw; from the gripper to it),
     /// `robot0_eef_pos`, `robot0_eef_quat` (xyzw), `robot0_gripper_qpos`. World frame, metres.
     pub fn observe(&self) -> BTreeMap<String, Vec<f64>> {
@@ -294,12 +309,9 @@ impl Env {
         body_pose(&self.data, target.joint.body) * target.body_from_grasp
     }
 
-    /// Axis and a point on it, world frame, pointing so that larger joint values open when `open > closed`.
-    pub fn axis(&self) -> (DVec3, DVec3) {
-        let joint = &self.scene.target.joint;
-        let pose = body_pose(&self.data, joint.body);
-        let model = &self.scene.model;
-        (pose.rotate(DVec3::from(model.jnt_axis()[joint.id])), pose.apply(DVec3::from(model.jnt_pos()[joint.id])))
+    /// The target joint where it stands now, world frame.
+    pub fn screw(&self) -> Screw {
+        object::screw(&self.data, &self.scene.target.joint)
     }
 
     pub fn joint_value(&self) -> f64 {
@@ -380,12 +392,4 @@ fn arm_state(data: &MjData<Arc<MjModel>>, scene: &Scene) -> ArmState {
 /// Of a quaternion and its negative, the one nearer to `reference`.
 fn near(q: DQuat, reference: DQuat) -> DQuat {
     if q.dot(reference) < 0.0 { -q } else { q }
-}
-
-fn wxyz(q: DQuat) -> [f64; 4] {
-    [q.w, q.x, q.y, q.z]
-}
-
-fn quat(wxyz: &[f64]) -> DQuat {
-    DQuat::from_xyzw(wxyz[1], wxyz[2], wxyz[3], wxyz[0])
 }

@@ -17,6 +17,11 @@ impl SimError {
         Self::Load { path: path.display().to_string(), what }
     }
 
+    pub(crate) fn nothing_moves(place: impl Into<String>) -> Self {
+        let hint = "look at the run's report for parts that were missed, or take another object";
+        Self::task("nothing moves: the model has no hinge and no slide", place, hint)
+    }
+
     pub(crate) fn task(what: impl Into<String>, place: impl Into<String>, hint: impl Into<String>) -> Self {
         Self::Task { what: what.into(), place: place.into(), hint: hint.into() }
     }

@@ -5,9 +5,9 @@
 use crate::env::{ACTION, Env};
 use crate::task::TaskKind;
 use glam::{DQuat, DVec3};
+use hingecast_geom::Pose;
 use hingecast_geom::pose::rotation_vector;
 use hingecast_geom::random::normal;
-use hingecast_geom::{JointKind, Pose, Screw};
 
 /// Steps of closing before the hand pulls.
 const CLOSE_STEPS: usize = 8;
@@ -136,14 +136,14 @@ impl Expert {
 
     /// The orientation of the hand for a part that the wrist does not follow: as if the part were closed.
     fn level(&self, env: &Env, grasp: &Pose) -> DQuat {
-        let screw = screw_of(env);
+        let screw = env.screw();
         let back = env.scene.target.closed - env.joint_value();
         (screw.motion(back) * *grasp).rot
     }
 
     /// The joint's motion by the lead, and its sign.
     fn ahead(&self, env: &Env, grasp: &Pose) -> (Pose, f64) {
-        let screw = screw_of(env);
+        let screw = env.screw();
         let target = &env.scene.target;
         let goal = match env.scene.task.kind {
             TaskKind::Close => target.closed,
@@ -176,10 +176,4 @@ impl Expert {
 /// While following, a wrist that does not turn keeps its orientation.
 fn grip_level(grip: &Pose, wanted: DQuat) -> DQuat {
     if grip.rot.dot(wanted) < 0.0 { -wanted } else { wanted }
-}
-
-fn screw_of(env: &Env) -> Screw {
-    let (axis, pivot) = env.axis();
-    let slides = env.scene.target.joint.slides;
-    Screw { kind: if slides { JointKind::Prismatic } else { JointKind::Revolute }, axis, pivot }
 }

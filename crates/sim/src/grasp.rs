@@ -8,7 +8,7 @@
 //! closing direction lies along the axis. Elsewhere the wrist turns with the part.
 
 use crate::SimError;
-use crate::object::{self, ObjectJoint, body_pose, bounds, hangs_on};
+use crate::object::{self, ObjectJoint, bounds, hangs_on, write_pose};
 use crate::scene::alone;
 use crate::task::{TABLE, TaskKind, TaskSpec};
 use glam::{DMat3, DQuat, DVec3};
@@ -23,8 +23,23 @@ const GRIPPER: &str = include_str!("../assets/gripper.xml");
 const WIDEST: f64 = 0.07;
 /// Thinner things than a sheet of card are not pinched reliably.
 const THINNEST: f64 = 0.003;
+/// Half of what the hand opens, m: where the pads' inner faces are then.
+const HALF_OPEN: f64 = 0.04;
+/// Points of a finger's inner face, wide open, in the grip's frame: across, along the approach, from the middle, m (gripper.xml).
+const FINGER: [[f64; 3]; 8] = [
+    [-0.0085, 0.0088, HALF_OPEN],
+    [0.0085, 0.0088, HALF_OPEN],
+    [-0.0085, -0.0088, HALF_OPEN],
+    [0.0085, -0.0088, HALF_OPEN],
+    [-0.0105, -0.02, 0.046],
+    [0.0105, -0.02, 0.046],
+    [-0.0105, -0.045, 0.046],
+    [0.0105, -0.045, 0.046],
+];
 /// How deep the pads' middle may sit below the surface that is met first, m. The pads reach 9 mm farther.
 const DEPTHS: [f64; 3] = [0.008, 0.016, 0.024];
+/// The same for small pieces, m: enough to hold.
+const TIPS: f64 = 0.003;
 /// How far the hand may lean back from pointing down when it comes from a side, rad. The sixth joint ends at 3.75 rad, 0.8 beyond
 /// the start; a level hand needs the fifth joint at its stop.
 const TILTS: [f64; 5] = [0.5, 0.75, 1.0, 1.3, FRAC_PI_2];
@@ -42,7 +57,7 @@ const HIGHEST: f64 = 0.4;
 const LARGEST: f64 = 0.75;
 /// Where the middle of the way shall be on the table, m from its centre towards the far side: in front of the arm with room on
 /// both sides. The covered box comes out at simulation.md's x 0..0.06.
-const MIDDLE: f64 = 0.0375;
+const MIDDLE: f64 = 0.0305;
 
 /// A hand that leans stands between the arm and the grasp: so much farther away the object is put when it lies level, m.
 const BEHIND: f64 = 0.12;
@@ -65,21 +80,37 @@ pub enum Size {
 
 type Probe = MjData<Arc<MjModel>>;
 
+/// The gripper in a probe's model, looked up by name once.
+#[derive(Clone, Copy)]
+struct Hand {
+    body: usize,
+    /// The geom that fingers hang on.
+    palm: usize,
+}
+
+impl Hand {
+    fn of(model: &MjModel) -> Self {
+        let id = |kind, name: &str| model.name_to_id(kind, name).expect("a name in our own gripper");
+        Self { body: id(MjtObjBase::mjOBJ_BODY, "gripper"), palm: id(MjtObjBase::mjOBJ_GEOM, "hand") }
+    }
+
+    fn owns(self, model: &MjModel, geom: usize) -> bool {
+        model.geom_bodyid()[geom] as usize == self.body
+    }
+}
+
 /// Tasks on this object, best first: one per place to hold. Empty when the gripper fits nowhere.
 ///
 /// # Errors
 /// When the model cannot be loaded, nothing moves, or `joint` is not there.
 pub fn candidates(path: &Path, kind: TaskKind, joint: Option<&str>, size: Size) -> Result<Vec<Candidate>, SimError> {
     let data = alone(path, 1.0, Some(GRIPPER))?;
+    let hand = Hand::of(data.model());
     let all = object::joints(data.model());
     let names: Vec<&str> = all.iter().map(|j| j.name.as_str()).collect();
     let place = path.display().to_string();
     if all.is_empty() {
-        return Err(SimError::task(
-            "nothing moves: the model has no hinge and no slide",
-            place,
-            "look at the run's report for parts that were missed, or take another object",
-        ));
+        return Err(SimError::nothing_moves(place));
     }
     if let Some(name) = joint.filter(|n| !names.contains(n)) {
         return Err(SimError::task(
@@ -92,7 +123,7 @@ pub fn candidates(path: &Path, kind: TaskKind, joint: Option<&str>, size: Size) 
     for j in all.iter().filter(|j| joint.is_none_or(|n| n == j.name)) {
         let s = match size {
             Size::Exactly(s) => s,
-            Size::Reachable(factor) => two_digits((factor * reachable_scale(&mut data_at(&data), j)).min(1.0)),
+            Size::Reachable(factor) => two_digits((factor * reachable_scale(&mut data_at(&data), hand, j)).min(1.0)),
         };
         out.extend(at_scale(path, kind, &j.name, s)?);
     }
@@ -113,12 +144,12 @@ fn two_digits(s: f64) -> f64 {
 }
 
 /// At most 1; so that the farthest point of the part neither travels nor stands beyond what the arm does with ease.
-fn reachable_scale(data: &mut Probe, joint: &ObjectJoint) -> f64 {
-    let (closed, open) = ends(data, joint);
+fn reachable_scale(data: &mut Probe, hand: Hand, joint: &ObjectJoint) -> f64 {
+    let (closed, open) = ends(data, hand, joint);
     pose_joint(data, joint, closed);
-    let Some([lo, hi]) = bounds(data, |g| is_object(data.model(), g)) else { return 1.0 };
+    let Some([lo, hi]) = object_bounds(data, hand) else { return 1.0 };
     let part = bounds(data, |g| is_part(data.model(), g, joint)).unwrap_or([lo, hi]);
-    let screw = screw(data, joint);
+    let screw = object::screw(data, joint);
     let motion = screw.motion(0.6 * (open - closed));
     let corner = |k: usize| {
         let pick = |bit: usize, l: f64, h: f64| if k >> bit & 1 == 0 { l } else { h };
@@ -135,12 +166,13 @@ fn at_scale(path: &Path, kind: TaskKind, name: &str, scale: f64) -> Result<Vec<C
     let mut data = alone(path, scale, Some(GRIPPER))?;
     park_gripper(&mut data);
     let Some(joint) = object::joints(data.model()).into_iter().find(|j| j.name == name) else { return Ok(Vec::new()) };
-    let (closed, open) = ends(&mut data, &joint);
+    let hand = Hand::of(data.model());
+    let (closed, open) = ends(&mut data, hand, &joint);
     pose_joint(&mut data, &joint, closed);
-    let Some([low, _]) = bounds(&data, |g| is_object(data.model(), g)) else { return Ok(Vec::new()) };
+    let Some([low, _]) = object_bounds(&data, hand) else { return Ok(Vec::new()) };
     let Some(part) = bounds(&data, |g| is_part(data.model(), g, &joint)) else { return Ok(Vec::new()) };
-    let screw = screw(&mut data, &joint);
-    let search = Search { closed, open, screw, low: low.z, part, joint };
+    let screw = object::screw(&data, &joint);
+    let search = Search { hand, closed, open, screw, low: low.z, part, joint };
     let mut base = TaskSpec::new(kind, name, scale);
     base.part_centre = 0.5 * (part[0] + part[1]);
     base.travel = (open - closed).abs();
@@ -152,10 +184,10 @@ fn at_scale(path: &Path, kind: TaskKind, name: &str, scale: f64) -> Result<Vec<C
 }
 
 /// Closed is the end at which the object is more compact; where both are alike, the one nearer to the recorded zero.
-fn ends(data: &mut Probe, joint: &ObjectJoint) -> (f64, f64) {
+fn ends(data: &mut Probe, hand: Hand, joint: &ObjectJoint) -> (f64, f64) {
     let volume = joint.range.map(|q| {
         pose_joint(data, joint, q);
-        bounds(data, |g| is_object(data.model(), g)).map_or(0.0, |[lo, hi]| {
+        object_bounds(data, hand).map_or(0.0, |[lo, hi]| {
             let size = hi - lo;
             size.x * size.y * size.z
         })
@@ -186,6 +218,7 @@ fn directions() -> Vec<(DVec3, DVec3)> {
 }
 
 struct Search {
+    hand: Hand,
     joint: ObjectJoint,
     closed: f64,
     open: f64,
@@ -207,7 +240,10 @@ impl Search {
         let ((cu, hu), (cv, hv), (ca, ha)) = (extent(closing), extent(side), extent(approach));
         let step = (2.0 * hu.max(hv) / 48.0).max(0.004);
         let (nu, nv) = ((hu / step).ceil() as i32, (hv / step).ceil() as i32);
-        // First pass: where would the fingers meet the part on both sides?
+        // A place that was judged before may have left the part half open.
+        pose_joint(data, &self.joint, self.closed);
+        // First pass: where would the fingers meet the part on both sides? Handles and knobs are smaller than the grid's step.
+        let mut places = self.details(data, approach, closing);
         let mut hits: Vec<(i32, i32, DVec3, f64)> = Vec::new();
         for u in -nu..=nu {
             for v in -nv..=nv {
@@ -218,10 +254,13 @@ impl Search {
                 }
             }
         }
-        let mut out = Vec::new();
         for &(u, v, point, width) in &hits {
             // A place whose neighbours could be held as well forgives errors.
             let room = hits.iter().filter(|h| (h.0 - u).abs() <= 3 && (h.1 - v).abs() <= 3).count() as f64 / 49.0;
+            places.push((point, width, room));
+        }
+        let mut out = Vec::new();
+        for (point, width, room) in places {
             let grasp = Pose::from_mat3_trans(DMat3::from_cols(closing.cross(approach), closing, approach), point);
             for turn_wrist in self.wrists(closing) {
                 if let Some(c) = self.judge(data, &grasp, width, room, turn_wrist, base) {
@@ -236,15 +275,44 @@ impl Search {
     fn pinch(&self, data: &mut Probe, from: DVec3, approach: DVec3, closing: DVec3) -> Option<(DVec3, f64)> {
         let met = self.ray(data, from, approach)?;
         // Deepest first: a better hold, where there is one.
-        DEPTHS.iter().rev().find_map(|depth| {
-            let at = from + approach * (met + depth);
-            let reach = 0.5 * 0.08;
-            let near = self.ray(data, at - closing * reach, closing)?;
-            let far = self.ray(data, at + closing * reach, -closing)?;
-            let width = 2.0 * reach - near - far;
-            let middle = at + closing * (0.5 * (near - far));
-            ((THINNEST..=WIDEST).contains(&width)).then_some((middle, width))
-        })
+        DEPTHS.iter().rev().find_map(|depth| self.thickness(data, from + approach * (met + depth), closing))
+    }
+
+    /// The middle of the part between the fingers if they close about `at`, and its width.
+    fn thickness(&self, data: &mut Probe, at: DVec3, closing: DVec3) -> Option<(DVec3, f64)> {
+        let near = self.ray(data, at - closing * HALF_OPEN, closing)?;
+        let far = self.ray(data, at + closing * HALF_OPEN, -closing)?;
+        let width = 2.0 * HALF_OPEN - near - far;
+        let middle = at + closing * (0.5 * (near - far));
+        ((THINNEST..=WIDEST).contains(&width)).then_some((middle, width))
+    }
+
+    /// Places on the part's own small pieces (bars, knobs): in their middle, and just below the face that is met first, where the tips
+    /// of the fingers need less room behind.
+    fn details(&self, data: &mut Probe, approach: DVec3, closing: DVec3) -> Vec<(DVec3, f64, f64)> {
+        let side = approach.cross(closing);
+        let pieces: Vec<[DVec3; 2]> = {
+            let model = data.model();
+            let own = (0..model.ffi().ngeom as usize).filter(|&g| is_part(model, g, &self.joint));
+            own.filter_map(|g| bounds(data, |other| other == g)).collect()
+        };
+        let mut out = Vec::new();
+        for [lo, hi] in pieces {
+            let (centre, half) = (0.5 * (lo + hi), 0.5 * (hi - lo));
+            if 2.0 * half.dot(closing.abs()) > WIDEST {
+                continue;
+            }
+            let deep = half.dot(approach.abs());
+            for depth in [deep, TIPS] {
+                let at = centre + approach * (depth - deep);
+                let Some((middle, width)) = self.thickness(data, at, closing) else { continue };
+                // How far to both sides could it be held as well?
+                let beside = [-0.012, -0.008, -0.004, 0.004, 0.008, 0.012];
+                let held = beside.iter().filter(|b| self.thickness(data, at + side * **b, closing).is_some()).count();
+                out.push((middle, width, held as f64 / beside.len() as f64));
+            }
+        }
+        out
     }
 
     /// Distance to the moving part, if it is the first thing met. A start inside a solid meets nothing.
@@ -277,6 +345,9 @@ impl Search {
             if !self.fits(data, &pose, 0.0) {
                 return None;
             }
+        }
+        if !self.closes(data, grasp, width) {
+            return None;
         }
         let span = self.open - self.closed;
         for share in ALONG {
@@ -335,6 +406,21 @@ impl Search {
         fine.max_by(|a, b| towards(*a).total_cmp(&towards(*b)))
     }
 
+    /// Nothing but the part stands in the fingers' way when they close: rays from the corners of pads and shafts inwards, as far as
+    /// the part's surface. A lip of the case behind a door's edge would stop one finger, and the hand would pull at the case.
+    fn closes(&self, data: &mut Probe, grasp: &Pose, width: f64) -> bool {
+        FINGER.iter().all(|&[side, along, inner]| {
+            [1.0, -1.0].into_iter().all(|finger| {
+                let from = grasp.apply(DVec3::new(side, finger * inner, along));
+                let inwards = grasp.rotate(DVec3::new(0.0, -finger, 0.0));
+                let groups = [1, 1, 1, 1, 1, 0];
+                let way = HALF_OPEN - 0.5 * width;
+                let (met, distance) = data.ray(&from.to_array(), &inwards.to_array(), Some(&groups), true, None, None);
+                met.is_none_or(|g| distance > way || is_part(data.model(), g, &self.joint))
+            })
+        })
+    }
+
     /// No contact of the hand deeper than `slack`, and the hand above the table. With slack, fingers may touch the part itself.
     fn fits(&self, data: &mut Probe, pose: &Pose, slack: f64) -> bool {
         place_gripper(data, pose);
@@ -342,19 +428,18 @@ impl Search {
         data.com_pos();
         data.collision();
         let model = data.model();
-        let [low, _] = bounds(data, |g| !is_object(model, g)).unwrap_or([DVec3::splat(f64::MAX); 2]);
+        let [low, _] = bounds(data, |g| self.hand.owns(model, g)).unwrap_or([DVec3::splat(f64::MAX); 2]);
         if low.z < self.low + 0.003 {
             return false;
         }
         data.contact().iter().all(|c| {
             let [a, b] = c.geom.map(|g| g.max(0) as usize);
-            let (hand, other) = match (is_object(model, a), is_object(model, b)) {
-                (false, true) => (a, b),
-                (true, false) => (b, a),
+            let (finger, other) = match [a, b].map(|g| self.hand.owns(model, g)) {
+                [true, false] => (a, b),
+                [false, true] => (b, a),
                 _ => return true,
             };
-            let palm = model.id_to_name(MjtObjBase::mjOBJ_GEOM, hand) == Some("hand");
-            let rocking = slack > 0.0 && !palm && is_part(model, other, &self.joint);
+            let rocking = slack > 0.0 && finger != self.hand.palm && is_part(model, other, &self.joint);
             rocking || c.dist > -slack
         })
     }
@@ -379,9 +464,8 @@ fn distinct(sorted: Vec<Candidate>) -> Vec<Candidate> {
     out
 }
 
-fn is_object(model: &MjModel, geom: usize) -> bool {
-    let gripper = model.name_to_id(MjtObjBase::mjOBJ_BODY, "gripper");
-    Some(model.geom_bodyid()[geom] as usize) != gripper
+fn object_bounds(data: &Probe, hand: Hand) -> Option<[DVec3; 2]> {
+    bounds(data, |g| !hand.owns(data.model(), g))
 }
 
 fn is_part(model: &MjModel, geom: usize, joint: &ObjectJoint) -> bool {
@@ -394,23 +478,9 @@ fn pose_joint(data: &mut Probe, joint: &ObjectJoint, q: f64) {
 }
 
 fn place_gripper(data: &mut Probe, pose: &Pose) {
-    let q = data.qpos_mut();
-    q[..3].copy_from_slice(&pose.trans.to_array());
-    q[3..7].copy_from_slice(&[pose.rot.w, pose.rot.x, pose.rot.y, pose.rot.z]);
+    write_pose(&mut data.qpos_mut()[..7], pose);
 }
 
 fn park_gripper(data: &mut Probe) {
     place_gripper(data, &Pose::from_trans(DVec3::new(0.0, 0.0, 50.0)));
-}
-
-/// The joint's motion in the base frame, from where it stands now.
-fn screw(data: &mut Probe, joint: &ObjectJoint) -> Screw {
-    data.kinematics();
-    let pose = body_pose(data, joint.body);
-    let model = data.model();
-    Screw {
-        kind: if joint.slides { JointKind::Prismatic } else { JointKind::Revolute },
-        axis: pose.rotate(DVec3::from(model.jnt_axis()[joint.id])),
-        pivot: pose.apply(DVec3::from(model.jnt_pos()[joint.id])),
-    }
 }

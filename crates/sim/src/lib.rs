@@ -2,7 +2,8 @@
 //!
 //! `check` loads a model, sweeps its joints and says what is wrong. The rest is a world with an arm: `object` and `scene` load an
 //! object or its twin onto a table, `grasp` finds where it can be held, `task` says what shall be done, `env` steps, observes and
-//! judges, `control` is the arm's control law, `expert` demonstrates, `spoil` makes wrong objects on purpose.
+//! judges, `control` is the arm's control law, `expert` demonstrates, `spoil` makes wrong objects on purpose, `path` says
+//! whether a part ended where the true joint would have it.
 
 pub mod check;
 pub mod control;
@@ -12,6 +13,7 @@ pub mod expert;
 pub mod grasp;
 mod log;
 pub mod object;
+pub mod path;
 pub mod picture;
 pub mod scene;
 pub mod spoil;
@@ -22,6 +24,7 @@ pub use check::{CheckConfig, FileCheck, JointSweep, check_file, check_twin};
 pub use env::{Env, Outcome, Start};
 pub use error::SimError;
 pub use expert::Expert;
+pub use path::SpotPath;
 pub use scene::{Scene, SceneConfig};
 pub use spoil::Spoil;
 pub use task::{TaskKind, TaskSpec};

@@ -2,8 +2,8 @@
 
 use crate::SimError;
 use crate::task::TaskSpec;
-use glam::{DMat3, DVec3};
-use hingecast_geom::Pose;
+use glam::{DMat3, DQuat, DVec3};
+use hingecast_geom::{JointKind, Pose, Screw};
 use mujoco_rs::prelude::*;
 use mujoco_rs::wrappers::mj_model::traits::ModelType;
 use std::path::{Path, PathBuf};
@@ -73,7 +73,6 @@ pub(crate) fn joints(model: &MjModel) -> Vec<ObjectJoint> {
                 MjtJoint::mjJNT_SLIDE => true,
                 _ => return None,
             };
-            let range = if model.jnt_limited()[id] { model.jnt_range()[id] } else { [0.0, std::f64::consts::TAU] };
             Some(ObjectJoint {
                 name,
                 id,
@@ -81,10 +80,15 @@ pub(crate) fn joints(model: &MjModel) -> Vec<ObjectJoint> {
                 dof: model.jnt_dofadr()[id] as usize,
                 body: model.jnt_bodyid()[id] as usize,
                 slides,
-                range,
+                range: joint_range(model, id),
             })
         })
         .collect()
+}
+
+/// A joint's limits, or one turn where it has none.
+pub(crate) fn joint_range(model: &MjModel, joint: usize) -> [f64; 2] {
+    if model.jnt_limited()[joint] { model.jnt_range()[joint] } else { [0.0, std::f64::consts::TAU] }
 }
 
 /// Whether `body` is `root` or hangs on it.
@@ -120,8 +124,36 @@ pub(crate) fn matrix(m: &[f64; 9]) -> DMat3 {
     DMat3::from_cols_array(m).transpose()
 }
 
+/// MuJoCo's order of a quaternion.
+pub(crate) fn wxyz(q: DQuat) -> [f64; 4] {
+    [q.w, q.x, q.y, q.z]
+}
+
+/// A pose as MuJoCo writes it into the seven numbers of a free joint: position, quaternion w x y z.
+pub(crate) fn pose_of(free: &[f64]) -> Pose {
+    let rot = DQuat::from_xyzw(free[4], free[5], free[6], free[3]);
+    Pose::new(rot, DVec3::from_slice(&free[..3]))
+}
+
+/// The other way.
+pub(crate) fn write_pose(free: &mut [f64], pose: &Pose) {
+    free[..3].copy_from_slice(&pose.trans.to_array());
+    free[3..7].copy_from_slice(&wxyz(pose.rot));
+}
+
 pub(crate) fn body_pose<M: ModelType>(data: &MjData<M>, body: usize) -> Pose {
     Pose::from_mat3_trans(matrix(&data.xmat()[body]), DVec3::from(data.xpos()[body]))
+}
+
+/// The screw of a joint where it stands now, world frame.
+pub(crate) fn screw<M: ModelType>(data: &MjData<M>, joint: &ObjectJoint) -> Screw {
+    let pose = body_pose(data, joint.body);
+    let model = data.model();
+    Screw {
+        kind: if joint.slides { JointKind::Prismatic } else { JointKind::Revolute },
+        axis: pose.rotate(DVec3::from(model.jnt_axis()[joint.id])),
+        pivot: pose.apply(DVec3::from(model.jnt_pos()[joint.id])),
+    }
 }
 
 /// The joint that the task is about, in this object or twin.
@@ -133,6 +165,8 @@ pub struct Target {
     pub open: f64,
     /// The grasp frame, fixed to the moving body.
     pub body_from_grasp: Pose,
+    /// The joint as it stands when closed, base frame; the sign is the model's own.
+    pub screw: Screw,
 }
 
 impl Target {
@@ -156,7 +190,8 @@ impl Target {
                 let distance = spot.distance(spot.clamp(lo, hi)) + 0.25 * (0.5 * (lo + hi)).distance(task.part_centre);
                 let body_from_grasp = body_pose(data, part).inverse() * task.grasp;
                 if best.as_ref().is_none_or(|(d, _)| distance < *d) {
-                    best = Some((distance, Self { joint: joint.clone(), closed, open, body_from_grasp }));
+                    let screw = screw(data, &joint);
+                    best = Some((distance, Self { joint: joint.clone(), closed, open, body_from_grasp, screw }));
                 }
             }
         }
@@ -173,11 +208,7 @@ impl Target {
                 place,
                 "is this the twin of that object, recorded in the same frame?",
             )),
-            None => Err(SimError::task(
-                "nothing moves: the model has no hinge and no slide",
-                place,
-                "look at the run's report for parts that were missed, or take another object",
-            )),
+            None => Err(SimError::nothing_moves(place)),
         }
     }
 }

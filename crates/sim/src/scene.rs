@@ -73,9 +73,10 @@ impl Scene {
             return Err(SimError::task("the model file is not there", place, hint));
         }
         let mut child = object::read(path, config.visuals)?;
-        if !config.spoil.is_empty() {
-            spoil(&mut child, config, task)?;
-        }
+        let closed = match config.spoil.is_empty() {
+            true => None,
+            false => Some(spoil(&mut child, config, task)?),
+        };
         let free = object::stands_free(&child);
         let mut spec = MjSpec::from_xml_string(ARM_ON_TABLE).map_err(|e| SimError::load(Path::new("the arm"), e))?;
         attach(&mut spec, &mut child, task.scale, !free, path)?;
@@ -89,6 +90,13 @@ impl Scene {
             data.mocap_quat_mut()[row] = [1.0, 0.0, 0.0, 0.0];
         }
         let target = Target::find(&mut data, task, &place)?;
+        if let Some(closed) = closed {
+            let now = (task.grasp * target.body_from_grasp.inverse()).trans;
+            if now.distance(closed.trans * task.scale) > 1e-6 {
+                let hint = "take the part's body out of its <frame> in the model file";
+                return Err(SimError::task("the spoiled part does not stay where it is when closed", place, hint));
+            }
+        }
         let ids = Ids::new(&model, target.joint.body);
         Ok(Self { model, task: Arc::new(task.clone()), target, xml: Arc::new(xml), ids })
     }
@@ -209,47 +217,54 @@ pub(crate) fn alone(path: &Path, scale: f64, with: Option<&str>) -> Result<MjDat
     Ok(data)
 }
 
-/// Moves the target joint of the (unscaled) specification as asked, and nothing else: where the file lets the part collide with
-/// its base, a wrong hinge may jam it there; where it excludes that (as twins do), the part passes through.
-fn spoil(spec: &mut MjSpec, config: &SceneConfig, task: &TaskSpec) -> Result<(), SimError> {
+/// Moves the target joint of the (unscaled) specification as asked, and nothing else: closed, the part stands where it stood, whatever
+/// the file's zero is. Where the file lets the part collide with its base, a wrong hinge may jam it there; where it excludes that (as
+/// twins do), the part passes through. Answers the part's closed pose, base frame, unscaled.
+fn spoil(spec: &mut MjSpec, config: &SceneConfig, task: &TaskSpec) -> Result<Pose, SimError> {
     let path = &config.object;
     let mut data = alone(path, 1.0, None)?;
-    let unscaled = {
-        let mut t = task.clone();
-        t.grasp.trans /= task.scale;
-        t.part_centre /= task.scale;
-        t
-    };
+    let (grasp, part_centre) = (task.grasp.trans / task.scale, task.part_centre / task.scale);
+    let mut unscaled = task.clone();
+    unscaled.grasp.trans = grasp;
+    unscaled.part_centre = part_centre;
     let target = Target::find(&mut data, &unscaled, &path.display().to_string())?;
-    data.kinematics();
     let joint = &target.joint;
-    let model = data.model();
-    let pose: Pose = object::body_pose(&data, joint.body);
-    let axis = pose.rotate(DVec3::from(model.jnt_axis()[joint.id]));
-    let pivot = pose.apply(DVec3::from(model.jnt_pos()[joint.id]));
     let [mut lo, mut hi] = joint.range;
-    let mut line = Line { axis, pivot };
+    let mut line = Line { axis: target.screw.axis, pivot: target.screw.pivot };
     for s in &config.spoil {
         match *s {
             Spoil::Limits(share) if target.closed <= target.open => hi = lo + share * (hi - lo),
             Spoil::Limits(share) => lo = hi - share * (hi - lo),
             Spoil::Pivot(mm) => {
-                line = line.spoiled(
-                    &Spoil::Pivot(mm / task.scale),
-                    joint.slides,
-                    unscaled.grasp.trans,
-                    unscaled.part_centre,
-                )
+                line = line.spoiled(&Spoil::Pivot(mm / task.scale), joint.slides, grasp, part_centre);
             }
-            s => line = line.spoiled(&s, joint.slides, unscaled.grasp.trans, unscaled.part_centre),
+            s => line = line.spoiled(&s, joint.slides, grasp, part_centre),
         }
     }
-    let entry = spec.joint_mut(&joint.name).ok_or_else(|| {
-        SimError::task("the joint has no name", path.display().to_string(), "give the joint a name in the model file")
-    })?;
-    let base = pose.inverse();
+
+    // The body's own pose becomes the closed one, and the joint counts from there.
+    data.qpos_mut()[joint.qpos] = target.closed;
+    data.kinematics();
+    let closed = object::body_pose(&data, joint.body);
+    let parent = data.model().body_parentid()[joint.body] as usize;
+    let parent_from_body = object::body_pose(&data, parent).inverse() * closed;
+    let nameless = |what: &str| {
+        let hint = format!("give the {what} a name in the model file");
+        SimError::task(format!("the {what} has no name"), path.display().to_string(), hint)
+    };
+    let body = data.model().id_to_name(MjtObjBase::mjOBJ_BODY, joint.body).and_then(|n| n.strip_prefix(PREFIX));
+    let degrees = spec.compiler().degree();
+    let body = body.and_then(|name| spec.world_body_mut().child_mut(name)).ok_or_else(|| nameless("part"))?;
+    *body.pos_mut() = parent_from_body.trans.to_array();
+    *body.quat_mut() = object::wxyz(parent_from_body.rot);
+    body.alt_mut().switch_quat();
+    let entry = spec.joint_mut(&joint.name).ok_or_else(|| nameless("joint"))?;
+    let base = closed.inverse();
     *entry.axis_mut() = base.rotate(line.axis).to_array();
     *entry.pos_mut() = base.apply(line.pivot).to_array();
-    *entry.range_mut() = [lo, hi];
-    Ok(())
+    // A file may count angles in degrees; limits then mean degrees here, too.
+    let unit = if degrees && !joint.slides { 1f64.to_degrees() } else { 1.0 };
+    *entry.range_mut() = [unit * lo, unit * hi];
+    *entry.ref_mut() = unit * target.closed;
+    Ok(closed)
 }

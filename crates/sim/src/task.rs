@@ -26,6 +26,14 @@ impl TaskKind {
         Self::NAMES[self as usize]
     }
 
+    /// The share of the range at which the task is done.
+    pub fn goal(self) -> f64 {
+        match self {
+            TaskKind::Open | TaskKind::HingedBox => 0.5,
+            TaskKind::Close => 0.1,
+        }
+    }
+
     pub fn from_name(name: &str) -> Option<Self> {
         [Self::Open, Self::Close, Self::HingedBox].into_iter().find(|k| k.name() == name)
     }
@@ -35,6 +43,8 @@ impl TaskKind {
 pub const TABLE: f64 = 0.8;
 /// The covered box of simulation.md: object at x 0..0.06, y -0.03..0.03, yaw +-0.2 about its nominal place.
 const SPREAD: [f64; 3] = [0.03, 0.03, 0.2];
+/// Where the joint stands at least when `close` begins, share of the range.
+pub(crate) const CLOSE_FROM: f64 = 0.6;
 /// Steps of 50 ms after which an episode has failed; robomimic's for its table tasks.
 pub const HORIZON: usize = 400;
 
@@ -88,11 +98,11 @@ impl TaskSpec {
         Pose::new(turn * self.place.rot, self.place.trans + shift)
     }
 
-    /// The share of the range at which the task is done; `moved` = (q - closed) / (open - closed).
+    /// Whether the task is done; `moved` = (q - closed) / (open - closed).
     pub fn done(&self, moved: f64) -> bool {
         match self.kind {
-            TaskKind::Open | TaskKind::HingedBox => moved >= 0.5,
-            TaskKind::Close => moved <= 0.1,
+            TaskKind::Open | TaskKind::HingedBox => moved >= self.kind.goal(),
+            TaskKind::Close => moved <= self.kind.goal(),
         }
     }
 }

@@ -13,7 +13,7 @@ use std::path::Path;
 /// Tries per place, and how many of them must succeed to look no further.
 const TRIES: u64 = 3;
 /// Sizes that are tried, times what the arm reaches with ease: a handle may be too thick for the gripper or too near to the next.
-const SIZES: [f64; 4] = [1.0, 0.75, 1.4, 0.55];
+const SIZES: [f64; 5] = [1.0, 0.75, 1.4, 0.55, 1.8];
 
 /// What was found out on the way.
 #[derive(Clone, Debug)]

@@ -1,7 +1,7 @@
 //! Whole episodes: seeds, replay to the bit, the demonstrator, spoiled objects, a twin with names and zeros of its own.
 
 use hingecast_sim::trial::{demonstrate, make_task};
-use hingecast_sim::{Env, Expert, Outcome, Scene, SceneConfig, Spoil, TaskKind};
+use hingecast_sim::{Env, Expert, Outcome, Scene, SceneConfig, Spoil, SpotPath, TaskKind};
 use std::path::{Path, PathBuf};
 
 fn covered_box() -> PathBuf {
@@ -146,7 +146,8 @@ fn a_spoiled_box_does_not_open_by_what_opens_the_true_one() {
         (0..10).filter(|&seed| replayed(&mut a, &mut b, seed)).count()
     };
     assert!(count(Spoil::Axis(1.0)) >= 9);
-    assert_eq!(count(Spoil::Edge), 0);
+    // A hand that pulls may wrench a lid open at its wrong edge, too: one of ten at most.
+    assert!(count(Spoil::Edge) <= 1);
 }
 
 #[test]
@@ -172,4 +173,83 @@ fn bad_input_is_named_in_three_lines() {
     action[2] = f64::NAN;
     three(env.step(&action).unwrap_err(), "action[2]");
     three(env.set_state(&[0.0; 3]).unwrap_err(), "3");
+}
+
+/// A demonstrator that knows the joint in front of it opens many a wrong one; where the part then is tells them apart.
+#[test]
+fn a_wrong_joint_opens_and_yet_not_as_the_true_one() {
+    let truth = scene(&covered_box(), &covered_box(), &[]);
+    let path = SpotPath::of(&truth);
+    assert_eq!(path.tolerance(), hingecast_sim::path::TOLERANCE);
+    let count = |spoil: &[Spoil]| {
+        let mut env = Env::new(&scene(&covered_box(), &covered_box(), spoil));
+        let ends = (0..10).map(|seed| {
+            let opened = demonstrate(&mut env, seed, |_, _| ()).unwrap() == Outcome::Success;
+            (opened, env.off(&path) <= path.tolerance(), env.off(&path))
+        });
+        ends.collect::<Vec<_>>()
+    };
+    let right = count(&[]);
+    assert!(right.iter().all(|(opened, as_true, _)| opened == as_true), "{right:?}");
+    assert!(right.iter().filter(|(opened, _, off)| *opened && *off < 1e-3).count() >= 9, "{right:?}");
+    // 2 degrees stay within half a pad; 30 degrees do not, though the lid comes up.
+    assert!(count(&[Spoil::Axis(2.0)]).iter().filter(|e| e.1).count() >= 9);
+    for spoil in [Spoil::Axis(30.0), Spoil::Limits(0.5), Spoil::Pivot(30.0), Spoil::Edge] {
+        let ends = count(&[spoil]);
+        assert!(ends.iter().all(|e| !e.1), "{spoil:?}: {ends:?}");
+        if spoil != Spoil::Edge {
+            assert!(ends.iter().filter(|e| e.0).count() >= 8, "{spoil:?}: {ends:?}");
+        }
+    }
+}
+
+/// The pads' width is written in two places: in the model of the hand and as the tolerance.
+#[test]
+fn the_tolerance_is_half_a_pad() {
+    let scene = scene(&covered_box(), &covered_box(), &[]);
+    let pad = scene.model.name_to_id(mujoco_rs::prelude::MjtObjBase::mjOBJ_GEOM, "left_pad").unwrap();
+    assert_eq!(scene.model.geom_size()[pad][0], hingecast_sim::path::TOLERANCE);
+}
+
+/// Whatever the file's zero and unit of angles are: a wrong hinge moves the part otherwise, but closed it stands where it stood.
+#[test]
+fn a_spoiled_joint_leaves_the_closed_part_where_it_was() {
+    let dir = tempfile::tempdir().unwrap();
+    let twin = a_twin(dir.path(), 0.06);
+    let degrees = dir.path().join("degrees.xml");
+    let text = std::fs::read_to_string(&twin).unwrap();
+    let text = text.replace("angle=\"radian\"", "angle=\"degree\"").replace("-0.785 0.785", "-44.97718691 44.97718691");
+    std::fs::write(&degrees, text).unwrap();
+    for file in [covered_box(), twin, degrees] {
+        let right = scene(&file, &covered_box(), &[]);
+        let (mut a, path) = (Env::new(&right), SpotPath::of(&right));
+        a.reset(3);
+        for (spoil, axis_deg, pivot_mm) in [
+            (Spoil::Axis(30.0), 30.0, 0.0),
+            (Spoil::Pivot(10.0), 0.0, 10.0),
+            (Spoil::Limits(0.5), 0.0, 0.0),
+            (Spoil::Edge, 180.0, 120.0),
+        ] {
+            let wrong = scene(&file, &covered_box(), &[spoil]);
+            let mut b = Env::new(&wrong);
+            b.reset(3);
+            let (p, q) = (a.grasp(), b.grasp());
+            assert!(
+                p.trans.distance(q.trans) < 1e-6 && (p.rot.inverse() * q.rot).w.abs() > 1.0 - 1e-9,
+                "{spoil:?} {file:?}"
+            );
+            let this = SpotPath::of(&wrong);
+            assert!(
+                (this.screw.axis.angle_between(path.screw.axis).to_degrees() - axis_deg).abs() < 1e-4,
+                "{spoil:?} {file:?}"
+            );
+            let off = 1e3 * this.screw.distance(path.screw.foot(path.spot));
+            assert!(
+                (off - pivot_mm).abs() < 12.0 * f64::from(u8::from(spoil == Spoil::Edge)) + 1e-3,
+                "{spoil:?} {file:?}: {off}"
+            );
+            let share = if spoil == Spoil::Limits(0.5) { 0.5 } else { 1.0 };
+            assert!((this.travel / path.travel - share).abs() < 1e-6, "{spoil:?} {file:?}");
+        }
+    }
 }

@@ -49,6 +49,8 @@ impl Default for Config {
 pub struct Input<'a> {
     pub name: &'a str,
     pub tree: &'a KinematicTree,
+    /// States of the recording: a tree without joints does not tell.
+    pub n_states: usize,
     /// Number of observations; `load(i)` is called up to three times for each.
     pub n_observations: usize,
     /// Diagonal of the object's box in the first state, scene units.
@@ -68,10 +70,7 @@ pub fn build<E: From<Cancelled> + Send>(
     progress: &Progress,
 ) -> Result<Twin, E> {
     let tree = input.tree;
-    let n_states = tree.joints.iter().map(|j| j.values.len()).max().unwrap_or(1).max(1);
-    let poses: Vec<Vec<Pose>> = (0..n_states)
-        .map(|s| if tree.joints.is_empty() { vec![Pose::IDENTITY; tree.parts.len()] } else { tree.poses_at(s) })
-        .collect();
+    let poses: Vec<Vec<Pose>> = (0..input.n_states).map(|s| tree.poses_at(s)).collect();
     let voxel = (config.voxel * input.diagonal) as f32;
     let volumes = fuse::fuse(input.n_observations, load, &poses, voxel, progress)?;
 

@@ -80,7 +80,15 @@ fn observe(state: usize, view: usize) -> Observation {
 #[test]
 fn sizes_masses_and_joints_come_back() {
     let tree = tree();
-    let input = Input { name: "box", tree: &tree, n_observations: 4 * 24, diagonal: 0.55, metric: true, up: DVec3::Z };
+    let input = Input {
+        name: "box",
+        tree: &tree,
+        n_states: 4,
+        n_observations: 4 * 24,
+        diagonal: 0.55,
+        metric: true,
+        up: DVec3::Z,
+    };
     let load = |i: usize| Ok::<_, Cancelled>(observe(i / 24, i % 24));
     let config = Config { voxel: 1.0 / 128.0, ..Default::default() };
     let twin = build(&input, &load, &config, &Progress::default()).unwrap();
@@ -119,4 +127,28 @@ fn sizes_masses_and_joints_come_back() {
     // Link frame: on the axis, beside the lid's centre of mass.
     let origin = hingecast_twin::export::link_origin(&twin, 1);
     assert!((origin - DVec3::new(-0.2, 0.0, 0.2)).length() < 0.01, "{origin}");
+}
+
+/// Four states and no joint: whatever moved was not recognised. Once this was an index out of bounds.
+#[test]
+fn a_recording_in_which_no_part_was_found_to_move_has_a_twin_of_one_part() {
+    let tree = KinematicTree { parts: vec!["base".into()], joints: Vec::new() };
+    let input = Input {
+        name: "box",
+        tree: &tree,
+        n_states: 4,
+        n_observations: 4 * 8,
+        diagonal: 0.55,
+        metric: true,
+        up: DVec3::Z,
+    };
+    let load = |i: usize| {
+        let mut seen = observe(i / 8, 3 * (i % 8));
+        seen.labels.iter_mut().filter(|l| **l != BACKGROUND).for_each(|l| *l = 0);
+        Ok::<_, Cancelled>(seen)
+    };
+    let config = Config { voxel: 1.0 / 64.0, ..Default::default() };
+    let twin = build(&input, &load, &config, &Progress::default()).unwrap();
+    assert_eq!(twin.parts.len(), 1);
+    assert!(!twin.parts[0].mesh.is_empty());
 }

@@ -46,6 +46,7 @@ pub fn run(context: &Context, run: &Path) -> Result<Vec<String>> {
     let input = twin::Input {
         name: &recording.name,
         tree: &found.tree,
+        n_states: recording.n_states,
         n_observations: frames.len(),
         diagonal: extent.diagonal,
         metric: recording.metric,

@@ -8,11 +8,11 @@ use hingecast_geom::Progress;
 use hingecast_policy::{Demos, Episode};
 use hingecast_sim::env::ACTION;
 use hingecast_sim::trial::demonstrate;
-use hingecast_sim::{Env, Outcome, Scene, TaskSpec};
+use hingecast_sim::{Env, Outcome, Scene, SceneConfig, TaskSpec};
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 /// Attempts between two looks at how many succeeded.
 const BLOCK: usize = 32;
@@ -40,16 +40,33 @@ pub struct Recorded {
     pub steps: usize,
 }
 
+/// Records `n` successful episodes of `task` on this object or twin.
+///
+/// # Errors
+/// Those of [`record`]; the object cannot be loaded.
+pub fn record_on(
+    object: &Path,
+    task: &TaskSpec,
+    n: usize,
+    seed: u64,
+    progress: &Progress,
+) -> Result<(Demos, Recorded)> {
+    let scene = Scene::new(&SceneConfig { object: object.to_path_buf(), spoil: Vec::new(), visuals: false }, task)?;
+    let world = WorldArgs { object: object.to_path_buf(), task: task.clone(), control_freq: 20, seed };
+    record(&scene, &world, n, progress)
+}
+
 /// Records `n` successful episodes of `scene`.
 ///
 /// # Errors
 /// When the demonstrator succeeds in less than one of four attempts, or the person stops it.
-pub fn record(scene: &Scene, args: &WorldArgs, n: usize, progress: &Progress) -> Result<(Demos, Recorded)> {
+fn record(scene: &Scene, args: &WorldArgs, n: usize, progress: &Progress) -> Result<(Demos, Recorded)> {
     let mut episodes: Vec<Episode> = Vec::new();
     let mut thrown_away: BTreeMap<Outcome, usize> = BTreeMap::new();
     let mut attempts = 0;
     while episodes.len() < n {
-        if attempts > 4 * n + 4 * BLOCK {
+        // Enough attempts to know; waiting for the last of `n` would take as long again.
+        if attempts >= 4 * BLOCK && 4 * episodes.len() < attempts {
             let ends: Vec<String> = thrown_away.iter().map(|(o, k)| format!("{k} {}", outcome_name(*o))).collect();
             return Err(Failure::new(
                 format!("the demonstrator succeeded in only {} of {attempts} attempts", episodes.len()),
@@ -187,7 +204,7 @@ pub fn outcome_name(outcome: Outcome) -> &'static str {
 ///
 /// # Errors
 /// When they are not ours.
-pub fn world_of(demos: &Demos, file: &std::path::Path) -> Result<WorldArgs> {
+pub fn world_of(demos: &Demos, file: &Path) -> Result<WorldArgs> {
     serde_json::from_value(demos.env_args["env_kwargs"].clone()).map_err(|e| {
         Failure::new(
             format!("these demonstrations were recorded in another simulator's world: {e}"),

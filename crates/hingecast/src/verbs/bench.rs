@@ -13,7 +13,7 @@ use hingecast_capture::synth::SynthConfig;
 use std::path::{Path, PathBuf};
 
 /// Object names of the suites, sorted.
-fn objects(suite: &[String]) -> Result<Vec<String>> {
+pub fn objects(suite: &[String]) -> Result<Vec<String>> {
     let mut out = Vec::new();
     for name in suite {
         match name.as_str() {

@@ -34,9 +34,7 @@ pub fn run(session: &Session, args: &Demos) -> Result<Outcome> {
     }
     let start = std::time::Instant::now();
     let task = new_task(session, args, &object, kind)?;
-    let scene = scene_of(&object, &task)?;
-    let world = WorldArgs { object, task: task.clone(), control_freq: 20, seed: args.seed };
-    let (demos, recorded) = record::record(&scene, &world, args.n, &session.ui.stage("demos"))?;
+    let (demos, recorded) = record::record_on(&object, &task, args.n, args.seed, &session.ui.stage("demos"))?;
     write(out, &demos)?;
     let secs = start.elapsed().as_secs_f64();
     let thrown: usize = recorded.thrown_away.values().sum();

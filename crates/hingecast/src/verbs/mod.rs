@@ -8,6 +8,8 @@ mod demo;
 mod demos;
 mod doctor;
 mod eval;
+#[cfg(feature = "mujoco")]
+mod experiment;
 mod grid;
 mod import;
 mod import_object;
@@ -72,6 +74,10 @@ pub fn run(cli: &Cli) -> Result<Outcome> {
         Verb::Rollout(args) => rollout::run(&session, args),
         #[cfg(not(feature = "mujoco"))]
         Verb::Rollout(_) => Err(without_mujoco("rollout")),
+        #[cfg(feature = "mujoco")]
+        Verb::Experiment(args) => experiment::run(&session, args),
+        #[cfg(not(feature = "mujoco"))]
+        Verb::Experiment(_) => Err(without_mujoco("experiment")),
         Verb::Train(args) => train::run(&session, args),
         Verb::Doctor => doctor::run(&session),
     }
