@@ -1,6 +1,7 @@
 //! A row of pictures of one episode, as PNG.
 
-use crate::failure::{Failure, Result};
+use crate::failure::Result;
+use hingecast_capture::recording::images::write_rgb;
 use hingecast_sim::{Env, Scene, Start, picture};
 use image::{RgbImage, imageops};
 use rayon::prelude::*;
@@ -30,7 +31,6 @@ pub fn write(scene: &Scene, start: &Start, states: &[Vec<f64>], path: &Path) -> 
     for (k, tile) in tiles.into_iter().enumerate() {
         imageops::replace(&mut sheet, &tile?, (k * (WIDTH + 4)) as i64, 0);
     }
-    let temporary = path.with_extension("tmp.png");
-    sheet.save(&temporary).map_err(Failure::io(path))?;
-    std::fs::rename(&temporary, path).map_err(Failure::io(path))
+    let (w, h) = (sheet.width() as usize, sheet.height() as usize);
+    Ok(write_rgb(path, sheet.as_raw(), w, h)?)
 }
