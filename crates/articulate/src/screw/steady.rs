@@ -95,7 +95,7 @@ mod tests {
     fn a_camera_that_is_off_comes_back_to_what_stands_still() {
         let around = |k: usize| {
             let turn = k as f64 / 12.0 * std::f64::consts::TAU;
-            let eye = DVec3::new(4.0 * turn.cos(), 4.0 * turn.sin(), if k % 2 == 0 { 2.0 } else { -1.5 });
+            let eye = DVec3::new(4.0 * turn.cos(), 4.0 * turn.sin(), if k.is_multiple_of(2) { 2.0 } else { -1.5 });
             Camera::look_at(eye, DVec3::ZERO, DVec3::Z, 96, 72, 0.7)
         };
         let cameras: Vec<Camera> = (0..12).map(around).collect();
