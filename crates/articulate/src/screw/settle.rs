@@ -4,15 +4,17 @@
 use super::adopt::asked_again;
 use super::cameras::{mean_point, without_mean};
 use super::discover::{Discovery, poses_of};
-use super::doubts::{REFUTED, rival};
+use super::doubts::{CORRELATED, REFUTED, rival};
 use super::evidence::{Evidence, Motion, Sample, Verdict, contradictions};
 use super::hypotheses::nearest_screw;
 use super::labels::label;
+use super::propose::MANY_STATES;
 use super::refine::{Report, Settings, refine};
 use crate::icp::{self, Surface};
 use glam::{DVec3, Vec3};
 use hingecast_geom::pose::rotation_vector;
 use hingecast_geom::{JointKind, KinematicTree, Pose, Screw};
+use nalgebra::{Matrix3, Vector3};
 use rayon::prelude::*;
 
 /// The final tree, and what it was found with.
@@ -65,6 +67,9 @@ pub fn settle(evidence: &mut Evidence, found: &Discovery, seed: u64) -> Settled 
         let gate = if round == 0 { 1.0 } else { 0.6 } * voxel;
         let settings = Settings { gates: [gate, 0.5 * gate], rounds: 6, partners: 6 };
         report = refine(evidence, &mut tree, &members, &free, &settings, seed ^ round);
+        if n_states < MANY_STATES {
+            straighten(evidence, &mut tree, &labels, seed);
+        }
         verdicts = judge_all(evidence, &tree);
         labels = label(evidence, &verdicts);
     }
@@ -118,6 +123,52 @@ fn slides(evidence: &Evidence, tree: &mut KinematicTree, labels: &[u8], seed: u6
         let (slide, nats) = rival(evidence, tree, j, &own, seed);
         if nats < REFUTED {
             *tree = slide;
+        }
+    }
+}
+
+/// Faces within this angle of the axis, or of square to it, radians, say where it points.
+const NEARLY: f64 = 0.09;
+
+/// Lets slides run along their part's own faces where the recording does not contradict that. A closed drawer shows its front alone, and in
+/// two states nothing else tells whether it rises by a degree on its way: two unknowns less are worth their share of evidence.
+fn straighten(evidence: &Evidence, tree: &mut KinematicTree, labels: &[u8], seed: u64) {
+    let voxel = evidence.lattice.voxel as f64;
+    // One round answers the cost of what it is given.
+    let settings = Settings { gates: [0.6 * voxel, 0.6 * voxel], rounds: 1, partners: 6 };
+    for j in 0..tree.joints.len() {
+        let axis = tree.joints[j].screw.axis;
+        if tree.joints[j].screw.kind != JointKind::Prismatic {
+            continue;
+        }
+        let own = members(evidence, labels, tree.joints[j].child);
+        let back: Vec<Pose> =
+            poses_of(tree, tree.joints[j].parent, evidence.n_states()).iter().map(Pose::inverse).collect();
+        // The axis is along the first faces and square to the second ones.
+        let mut spread = Matrix3::zeros();
+        for (s, _) in &own {
+            let n = back[s.state].rotate(s.normal.as_dvec3());
+            let (along, n) = (n.dot(axis).abs(), Vector3::new(n.x, n.y, n.z));
+            if along > NEARLY.cos() {
+                spread -= n * n.transpose();
+            } else if along < NEARLY.sin() {
+                spread += n * n.transpose();
+            }
+        }
+        let eigen = spread.symmetric_eigen();
+        let d = eigen.eigenvectors.column(eigen.eigenvalues.imin());
+        let d = DVec3::new(d[0], d[1], d[2]);
+        if d.dot(axis).abs() < NEARLY.cos() {
+            continue;
+        }
+        let mut straight = tree.clone();
+        straight.joints[j].screw.axis = d * d.dot(axis).signum();
+        let free: Vec<bool> = (0..tree.joints.len()).map(|k| k == j).collect();
+        let cost = |tree: &KinematicTree| refine(evidence, &mut tree.clone(), &own, &free, &settings, seed).cost;
+        let independent = own.len() as f64 / CORRELATED;
+        let lost = 0.5 * independent * ((cost(&straight) + 1e-6) / (cost(tree) + 1e-6)).ln();
+        if lost < independent.max(2.0).ln() {
+            *tree = straight;
         }
     }
 }
