@@ -4,7 +4,7 @@
 //! surface is gathered anew, and so on. What all views have in common cannot be seen from within, so the mean
 //! correction is taken out again: errors of many cameras average out, errors of one do not.
 
-use super::cloud::{DepthView, merge};
+use super::cloud::{DepthView, deviation, merge};
 use crate::icp::{self, Surface};
 use glam::{DVec3, Vec3};
 use hingecast_geom::Pose;
@@ -28,8 +28,7 @@ pub fn align(views: &mut [DepthView], voxel: f32) {
     let planes: Vec<Vec<(Vec3, Vec3)>> = views
         .par_iter()
         .map(|view| {
-            let pixels = view.class.iter().filter(|c| **c == super::cloud::OBJECT).count();
-            let stride = ((pixels as f64 / POINTS as f64).sqrt().round() as usize).max(1);
+            let stride = view.stride_for(POINTS);
             let mut out = Vec::new();
             view.planes(stride, &mut |x, n| out.push((x, n)));
             out
@@ -88,11 +87,7 @@ fn residual(planes: &[Vec<(Vec3, Vec3)>], surface: &Surface) -> f32 {
             (surface.normals[i].dot(*n) > 0.8).then(|| surface.normals[i].dot(*x - surface.points[i]).abs())
         })
         .collect();
-    if off.is_empty() {
-        return 0.0;
-    }
-    let half = off.len() / 2;
-    *off.select_nth_unstable_by(half, f32::total_cmp).1 / 0.6745
+    deviation(&mut off)
 }
 
 /// Takes the mean rotation, and the mean shift of the object's centre, out of the corrections.

@@ -49,9 +49,14 @@ impl DepthView {
         if second.len() < 20 {
             return 0.0;
         }
-        let half = second.len() / 2;
-        // Median to standard deviation, and the variance of a - (b + c)/2.
-        *second.select_nth_unstable_by(half, f32::total_cmp).1 / 0.6745 / 1.5f32.sqrt()
+        // Of the variance of a - (b + c)/2.
+        deviation(&mut second) / 1.5f32.sqrt()
+    }
+
+    /// Every so many pixels along rows and columns give about `count` points of the object.
+    pub fn stride_for(&self, count: usize) -> usize {
+        let pixels = self.class.iter().filter(|c| **c == OBJECT).count();
+        ((pixels as f64 / count as f64).sqrt().round() as usize).max(1)
     }
 
     /// Half the window that makes normals good enough at this noise, pixels.
@@ -211,8 +216,7 @@ fn flatten(cloud: &mut Cloud, pixels: &[f32], voxel: f32) {
             sum / weight.max(1.0)
         };
         let mut some: Vec<f32> = (0..cloud.points.len()).into_par_iter().step_by(16).map(|i| plane(i).abs()).collect();
-        let half = some.len() / 2;
-        if some.is_empty() || *some.select_nth_unstable_by(half, f32::total_cmp).1 < ROUGH * voxel {
+        if median(&mut some) < ROUGH * voxel {
             return;
         }
         let off: Vec<f32> = (0..cloud.points.len()).into_par_iter().map(plane).collect();
@@ -220,6 +224,17 @@ fn flatten(cloud: &mut Cloud, pixels: &[f32], voxel: f32) {
             *x += *n * off;
         }
     }
+}
+
+/// The upper median; 0 of nothing.
+fn median(values: &mut [f32]) -> f32 {
+    let half = values.len() / 2;
+    if values.is_empty() { 0.0 } else { *values.select_nth_unstable_by(half, f32::total_cmp).1 }
+}
+
+/// Standard deviation of what has these absolute values, by their median: strays do not matter.
+pub fn deviation(absolute: &mut [f32]) -> f32 {
+    median(absolute) / 0.6745
 }
 
 /// Place on Morton's curve: the bits of x, y and z in turns. Coordinates are not negative.

@@ -10,7 +10,7 @@ use hingecast_geom::{Joint, JointKind, KinematicTree};
 use std::collections::HashMap;
 
 /// Samples count as independent evidence in groups of this size: neighbours share their noise.
-pub const CORRELATED: f64 = 25.0;
+const CORRELATED: f64 = 25.0;
 /// Log-likelihood ratio (nats) below which a rival is not refuted.
 pub const REFUTED: f64 = 10.0;
 /// Standard deviations worth mentioning: axis [deg], pivot [share of the object's extent].
@@ -119,15 +119,24 @@ pub fn rival(
     let wide = Settings { gates: [2.0 * voxel, 0.6 * voxel], rounds: 8, partners: 6 };
     refine(evidence, &mut other, members, &free, &wide, seed);
     let theirs = refine(evidence, &mut other, members, &free, &settings, seed);
-    let floor = 1e-6;
-    let independent = members.len() as f64 / CORRELATED;
     // A hinge has two unknowns more than a slide.
-    let extra = independent.max(2.0).ln() * if kind == JointKind::Prismatic { -1.0 } else { 1.0 };
+    let extra = two_unknowns(members.len()) * if kind == JointKind::Prismatic { -1.0 } else { 1.0 };
     // A hinge that hardly turns is the slide in other words, not a rival.
     let turn = other.joints[j].values.iter().fold(0.0, |m: f64, v| m.max(v.abs()));
     let same = if kind.turns() && turn < SAME_TURN { REFUTED } else { 0.0 };
-    let nats = 0.5 * independent * ((theirs.cost + floor) / (own.cost + floor)).ln() + extra + same;
+    let nats = behind(members.len(), theirs.cost, own.cost) + extra + same;
     (other, nats)
+}
+
+/// How many nats worse than `own` a fit with cost `theirs` explains `n` samples.
+pub fn behind(n: usize, theirs: f64, own: f64) -> f64 {
+    let floor = 1e-6;
+    0.5 * (n as f64 / CORRELATED) * ((theirs + floor) / (own + floor)).ln()
+}
+
+/// What two unknowns must gain on `n` samples, nats (the Bayesian information criterion).
+pub fn two_unknowns(n: usize) -> f64 {
+    (n as f64 / CORRELATED).max(2.0).ln()
 }
 
 /// Turns a hinge into the slide that moves the part's middle alike, and a slide into a hinge far away.

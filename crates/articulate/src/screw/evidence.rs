@@ -1,6 +1,6 @@
 //! All states' surfaces and spaces, and what they say about a motion.
 
-use super::cloud::{DepthView, gather};
+use super::cloud::{DepthView, deviation, gather};
 use super::space::{Answer, Lattice, Space};
 use crate::icp::Surface;
 use glam::{Mat3, Vec3};
@@ -166,12 +166,7 @@ impl Evidence {
                 self.plane_distance(t, s.point, s.normal)
             })
             .collect();
-        if off.is_empty() {
-            return 0.0;
-        }
-        let half = off.len() / 2;
-        // Median to standard deviation.
-        *off.select_nth_unstable_by(half, f32::total_cmp).1 / 0.6745
+        deviation(&mut off)
     }
 
     /// Distance from the plane of state t's sample nearest to `x`, if it lies within a voxel and faces the same way.

@@ -4,7 +4,7 @@
 use super::adopt::asked_again;
 use super::cameras::{mean_point, without_mean};
 use super::discover::{Discovery, poses_of};
-use super::doubts::{CORRELATED, REFUTED, rival};
+use super::doubts::{REFUTED, behind, rival, two_unknowns};
 use super::evidence::{Evidence, Motion, Sample, Verdict, contradictions};
 use super::hypotheses::nearest_screw;
 use super::labels::label;
@@ -165,9 +165,7 @@ fn straighten(evidence: &Evidence, tree: &mut KinematicTree, labels: &[u8], seed
         straight.joints[j].screw.axis = d * d.dot(axis).signum();
         let free: Vec<bool> = (0..tree.joints.len()).map(|k| k == j).collect();
         let cost = |tree: &KinematicTree| refine(evidence, &mut tree.clone(), &own, &free, &settings, seed).cost;
-        let independent = own.len() as f64 / CORRELATED;
-        let lost = 0.5 * independent * ((cost(&straight) + 1e-6) / (cost(tree) + 1e-6)).ln();
-        if lost < independent.max(2.0).ln() {
+        if behind(own.len(), cost(&straight), cost(tree)) < two_unknowns(own.len()) {
             *tree = straight;
         }
     }

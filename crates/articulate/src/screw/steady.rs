@@ -43,8 +43,7 @@ pub fn align(views: &mut [DepthView], evidence: &Evidence, state: usize, labels:
         near.is_some_and(|(i, _)| labels[i] == 0)
     };
     views.par_iter_mut().for_each(|view| {
-        let pixels = view.class.iter().filter(|c| **c == super::cloud::OBJECT).count();
-        let stride = ((pixels as f64 / POINTS as f64).sqrt().round() as usize).max(1);
+        let stride = view.stride_for(POINTS);
         let (mut points, mut normals) = (Vec::new(), Vec::new());
         view.planes(stride, &mut |x, n| {
             if stands(x) {

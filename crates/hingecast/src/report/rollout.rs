@@ -5,7 +5,7 @@ use super::html::{doubts, escape, head};
 use super::rollout_plot;
 use crate::failure::{Failure, Result};
 use crate::simulate::record::outcome_name;
-use crate::simulate::rollout::WorldResult;
+use crate::simulate::rollout::{EpisodeResult, WorldResult};
 use hingecast_geom::ply::write_whole;
 use hingecast_policy::statistics::Paired;
 use hingecast_sim::{Outcome, TaskKind, TaskSpec};
@@ -116,7 +116,7 @@ fn differences(out: &mut String, results: &[WorldResult]) {
          <th>95 % interval (Tango)</th><th>both succeed</th><th>only {name}</th><th>only this world</th><th>neither</th>\
          <th>P (McNemar, exact)</th></tr>"
     );
-    let won = |r: &WorldResult| -> Vec<bool> { r.results.iter().map(|e| e.outcome == Outcome::Success).collect() };
+    let won = |r: &WorldResult| -> Vec<bool> { r.results.iter().map(EpisodeResult::won).collect() };
     for r in others {
         let pairs = Paired::count(&won(first), &won(r));
         let c = pairs.compare();

@@ -2,7 +2,6 @@
 
 use super::draw::PALETTE;
 use crate::simulate::rollout::{STEP_SECS, WorldResult};
-use hingecast_sim::Outcome;
 use plotters::prelude::*;
 
 /// Of the palette: strong ones first, the base's grey late.
@@ -27,7 +26,7 @@ pub(super) fn interval(rate: f64, [lo, hi]: [f64; 2]) -> String {
 /// Share of all episodes that have succeeded by a time, a line a world; a little farther than the last success.
 pub(super) fn success_over_time(results: &[WorldResult], horizon: usize) -> String {
     let mut svg = String::new();
-    let last = results.iter().flat_map(|r| &r.results).filter(|e| e.outcome == Outcome::Success).map(|e| e.steps).max();
+    let last = results.iter().flat_map(|r| &r.results).filter(|e| e.won()).map(|e| e.steps).max();
     let until = last.map_or(horizon, |steps| (steps + steps / 4).min(horizon));
     {
         let area = SVGBackend::with_string(&mut svg, (720, 300)).into_drawing_area();
@@ -64,7 +63,7 @@ pub(super) fn success_over_time(results: &[WorldResult], horizon: usize) -> Stri
 
 /// (s, %) corners of the stairs: up at every success, flat between.
 fn steps_up(r: &WorldResult, until: usize) -> Vec<(f64, f64)> {
-    let mut times: Vec<usize> = r.results.iter().filter(|e| e.outcome == Outcome::Success).map(|e| e.steps).collect();
+    let mut times: Vec<usize> = r.results.iter().filter(|e| e.won()).map(|e| e.steps).collect();
     times.sort_unstable();
     let percent = |k: usize| 100.0 * k as f64 / r.episodes as f64;
     let mut out = vec![(0.0, 0.0)];

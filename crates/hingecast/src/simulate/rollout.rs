@@ -4,7 +4,7 @@
 //! Two things are counted. *Success*: the joint moved as far as the task asks, by its own limits. *As true*: the part ended where the
 //! joint of the first world (the true object) would have it (`sim::path`): a compliant arm opens many a wrong hinge.
 
-use super::record::{ENV_NAME, outcome_name};
+use super::record::{ENV_NAME, episode_seed, outcome_name};
 use super::strip;
 use crate::failure::{Failure, Result};
 use glam::DVec3;
@@ -126,7 +126,7 @@ pub fn episodes(
             |env, k| {
                 // Asked before as well: a stop must not wait for an episode that has not begun.
                 report(done.load(Ordering::Relaxed))?;
-                let result = episode(policy, env, truth, (seed << 20) + k as u64, |_| ())?;
+                let result = episode(policy, env, truth, episode_seed(seed, k), |_| ())?;
                 report(done.fetch_add(1, Ordering::Relaxed) + 1)?;
                 Ok(result)
             },
