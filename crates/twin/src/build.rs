@@ -22,7 +22,7 @@ pub struct Config {
     pub simplify_error: f64,
     /// Convex pieces of one part.
     pub max_hulls: u32,
-    /// Pieces of surface smaller than this share of the part's largest piece are dropped.
+    /// Pieces of surface smaller than this share of the part's largest piece are dropped, unless views agree on them.
     pub crumbs: f64,
     /// At most this many images colour the vertices.
     pub color_views: usize,
@@ -107,7 +107,7 @@ pub fn build<E: From<Cancelled> + Send>(
 
     let mut doubts = Vec::new();
     let mesh_of = |field: &Field| {
-        let fine = surface::drop_crumbs(&surface::extract(field), config.crumbs);
+        let fine = surface::drop_crumbs(&surface::extract(field), config.crumbs, &|x| field.firm_near(x));
         simplify::simplify(&fine, config.max_faces, (config.simplify_error * input.diagonal) as f32)
     };
     let mut meshes: Vec<TriMesh> =

@@ -36,5 +36,5 @@ pub fn trim(part: usize, fields: &[Option<Field>], nearer: &[usize], poses: &[Ve
         let touches = others.iter().any(|(field, into)| into.iter().any(|(r, t)| field.at(*r * x + *t) < ONE_VOXEL));
         if touches { 1.0 } else { value }
     });
-    Some(Field { origin: own.origin, voxel: own.voxel, dims: own.dims, values: values.collect(), known: Vec::new() })
+    Some(Field { values: values.collect(), known: Vec::new(), firm: own.firm.clone(), ..*own })
 }

@@ -10,7 +10,7 @@ use crate::{BACKGROUND, Observation, UNKNOWN};
 use glam::Vec3;
 use hingecast_geom::{Cancelled, Pose};
 use rayon::prelude::*;
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::sync::atomic::{AtomicU32, Ordering};
 
 /// Voxels per block edge.
@@ -20,10 +20,14 @@ const BLOCK: usize = (B * B * B) as usize;
 const MIN_HITS: u32 = 3;
 /// Rays that must agree before space without any surface counts as empty.
 const MIN_EMPTY: u16 = 2;
-/// A sheet thinner than a voxel: its front and back, averaged, leave nothing negative. Voxels with this many
-/// surface pixels whose average distance to the surface is below three quarters of a voxel are kept all the same.
-const SHEET_HITS: u32 = 4;
-const SHEET_VALUE: f32 = 0.25;
+/// A sheet or a bar thinner than a voxel: front and back, averaged, leave nothing negative, and pixels beside a bar look past it.
+/// Voxels with this many surface pixels are kept all the same when their average distance to the surface is below three quarters of
+/// a voxel, or when the pixels cover this share of the voxel's face in the mean over all views.
+const THIN_HITS: u32 = 4;
+const THIN_VALUE: f32 = 0.25;
+const THIN_COVER: f32 = 0.25;
+/// Unit of [`Block::cover`]: 1/256 of a voxel's face.
+const COVER_UNIT: f32 = 256.0;
 
 /// Voxels from the surface beyond which unseen space is nobody's shell.
 const SHELL: usize = 4;
@@ -46,14 +50,21 @@ struct Block {
     key: Key,
     sum: Vec<f32>,
     weight: Vec<f32>,
-    /// Surface pixels that fell into each voxel.
+    /// Surface pixels that fell into each voxel, and the area that they stand for.
     hits: Vec<AtomicU32>,
+    cover: Vec<AtomicU32>,
 }
 
 impl Block {
     fn new(key: Key) -> Self {
-        let hits = (0..BLOCK).map(|_| AtomicU32::new(0)).collect();
-        Self { key, sum: vec![0.0; BLOCK], weight: vec![0.0; BLOCK], hits }
+        let zeros = || (0..BLOCK).map(|_| AtomicU32::new(0)).collect();
+        Self { key, sum: vec![0.0; BLOCK], weight: vec![0.0; BLOCK], hits: zeros(), cover: zeros() }
+    }
+
+    /// Whether voxel `i` holds surface for sure: enough pixels, and they cover enough of it in all views together.
+    fn firm(&self, i: usize) -> bool {
+        self.hits[i].load(Ordering::Relaxed) >= THIN_HITS
+            && self.cover[i].load(Ordering::Relaxed) as f32 >= THIN_COVER * COVER_UNIT * self.weight[i]
     }
 }
 
@@ -65,6 +76,8 @@ pub struct Field {
     pub values: Vec<f32>,
     /// True where a ray or a surface said something.
     pub known: Vec<bool>,
+    /// True where views agree on a surface in the voxel.
+    pub firm: Vec<bool>,
 }
 
 impl PartVolume {
@@ -167,29 +180,25 @@ impl PartVolume {
         let base = Vec3::new(self.lo[2] as f32, self.lo[1] as f32, self.lo[0] as f32) * self.block_size();
         let origin = base - self.voxel * 0.5;
         let total = dims[0] * dims[1] * dims[2];
-        let mut field = Field { origin, voxel: self.voxel, dims, values: vec![1.0; total], known: vec![true; total] };
-        let mut fill = |key: &Key, f: &dyn Fn(usize) -> Option<f32>| {
-            for i in 0..BLOCK {
-                let (x, y, z) = (i % 8, i / 8 % 8, i / 64);
-                let at = |k: i32, lo: i32, d: usize| ((k - lo) * B) as usize + d + 1;
-                let index =
-                    field.index(at(key[2], self.lo[2], x), at(key[1], self.lo[1], y), at(key[0], self.lo[0], z));
-                match f(i) {
-                    Some(value) => field.values[index] = value,
-                    None => {
-                        field.values[index] = -1.0;
-                        field.known[index] = false;
-                    }
-                }
-            }
+        let mut field = Field {
+            origin,
+            voxel: self.voxel,
+            dims,
+            values: vec![1.0; total],
+            known: vec![true; total],
+            firm: vec![false; total],
+        };
+        let mut set = |i: usize, value: Option<f32>| {
+            field.values[i] = value.unwrap_or(-1.0);
+            field.known[i] = value.is_some();
         };
         for b in &self.blocks {
-            fill(&b.key, &|i| if b.weight[i] > 0.0 { Some(b.sum[i] / b.weight[i]) } else { None });
+            (0..BLOCK).for_each(|i| set(self.index(dims, &b.key, i), (b.weight[i] > 0.0).then(|| b.sum[i] / b.weight[i])));
         }
         for (key, empty) in &self.hollow {
-            fill(key, &|_| if *empty >= MIN_EMPTY { Some(1.0) } else { None });
+            (0..BLOCK).for_each(|i| set(self.index(dims, key, i), (*empty >= MIN_EMPTY).then_some(1.0)));
         }
-        self.keep_sheets(&mut field);
+        self.keep_thin(&mut field);
         if enclosed {
             field.open_unreached();
         } else {
@@ -204,40 +213,43 @@ impl PartVolume {
         field
     }
 
-    /// Makes voxels of sheets solid that the average of front and back has lost.
-    fn keep_sheets(&self, field: &mut Field) {
-        let mut lost = Vec::new();
+    /// Where voxel `i` of block `key` lies in the dense field, which has an empty border of one voxel.
+    fn index(&self, dims: [usize; 3], key: &Key, i: usize) -> usize {
+        let at = |a: usize, d: usize| ((key[a] - self.lo[a]) * B) as usize + d + 1;
+        (at(0, i / 64) * dims[1] + at(1, i / 8 % 8)) * dims[0] + at(2, i % 8)
+    }
+
+    /// Notes which voxels hold surface for sure, and makes those of thin things solid that the average has lost.
+    fn keep_thin(&self, field: &mut Field) {
+        let (mut lost, mut touching) = (Vec::new(), Vec::new());
         for b in &self.blocks {
-            for i in 0..BLOCK {
-                let near = b.weight[i] > 0.0 && (0.0..SHEET_VALUE).contains(&(b.sum[i] / b.weight[i]));
-                if !near || b.hits[i].load(Ordering::Relaxed) < SHEET_HITS {
+            for i in (0..BLOCK).filter(|&i| b.weight[i] > 0.0 && b.hits[i].load(Ordering::Relaxed) >= THIN_HITS) {
+                let at = self.index(field.dims, &b.key, i);
+                field.firm[at] = b.firm(i);
+                if !(field.values[at] >= 0.0 && (field.firm[at] || field.values[at] < THIN_VALUE)) {
                     continue;
                 }
-                let at = |k: i32, lo: i32, d: usize| ((k - lo) * B) as usize + d + 1;
-                let (x, y, z) = (
-                    at(b.key[2], self.lo[2], i % 8),
-                    at(b.key[1], self.lo[1], i / 8 % 8),
-                    at(b.key[0], self.lo[0], i / 64),
-                );
-                // The grid has an empty border, so x - 1 .. x + 1 exist.
-                let solid_beside = (z - 1..=z + 1).any(|z| {
-                    (y - 1..=y + 1).any(|y| (x - 1..=x + 1).any(|x| field.values[field.index(x, y, z)] < 0.0))
-                });
-                if !solid_beside {
-                    lost.push(field.index(x, y, z));
-                }
+                let solid = field.around(at).any(|j| field.values[j] < 0.0);
+                if solid { touching.push(at) } else { lost.push(at) }
             }
         }
-        for i in lost {
-            // Half a voxel inside.
-            field.values[i] = -1.0 / 6.0;
-        }
+        // Where a bar meets its post, what lies between them is the bar's.
+        let thin: BTreeSet<usize> = lost.iter().copied().collect();
+        lost.extend(touching.into_iter().filter(|&i| field.around(i).any(|j| thin.contains(&j))));
+        let depth = |i: usize| {
+            let beside: Vec<f32> = field.beside(i).map(|j| field.values[j]).filter(|v| *v > 0.0).collect();
+            // The surface comes out a third of a voxel from the voxel's middle.
+            -0.5 * beside.iter().sum::<f32>() / beside.len().max(1) as f32
+        };
+        let depths: Vec<f32> = lost.iter().map(|&i| depth(i)).collect();
+        lost.iter().zip(depths).for_each(|(&i, depth)| field.values[i] = depth.min(-1e-3));
     }
 }
 
 /// Counts the part's surface pixels per voxel. Sums of integers: the order of threads does not matter.
 fn count_hits(blocks: &[Block], seen: &Observation, world_from_canonical: &Pose, part: u8, voxel: f32) {
     let canonical_from_camera = world_from_canonical.inverse() * seen.camera.camera_from_world.inverse();
+    let pixel_area = 1.0 / (seen.camera.fx * seen.camera.fy) as f32;
     for (i, &label) in seen.labels.iter().enumerate() {
         let depth = seen.depth[i];
         if label != part || !(depth > 0.0) {
@@ -247,7 +259,9 @@ fn count_hits(blocks: &[Block], seen: &Observation, world_from_canonical: &Pose,
         let key = [x.z.div_euclid(B), x.y.div_euclid(B), x.x.div_euclid(B)];
         if let Ok(b) = blocks.binary_search_by_key(&key, |b| b.key) {
             let inner = (x.z.rem_euclid(B) * B + x.y.rem_euclid(B)) * B + x.x.rem_euclid(B);
+            let faces = pixel_area * depth * depth / (voxel * voxel);
             blocks[b].hits[inner as usize].fetch_add(1, Ordering::Relaxed);
+            blocks[b].cover[inner as usize].fetch_add((faces * COVER_UNIT) as u32, Ordering::Relaxed);
         }
     }
 }
@@ -262,6 +276,30 @@ impl Field {
     /// What all solid voxels lie within.
     pub fn hull(&self) -> Slabs {
         Slabs::around((0..self.values.len()).filter(|&i| self.values[i] < 0.0).map(|i| self.place(i)))
+    }
+
+    /// The six voxels that share a face with voxel `i`, which is not on the border.
+    fn beside(&self, i: usize) -> impl Iterator<Item = usize> + use<> {
+        let row = self.dims[0];
+        [1, row, row * self.dims[1]].into_iter().flat_map(move |step| [i - step, i + step])
+    }
+
+    /// The voxels within one of `i` along each axis, itself included; `i` is not on the border.
+    fn around(&self, i: usize) -> impl Iterator<Item = usize> + use<> {
+        let (row, slab) = (self.dims[0], self.dims[0] * self.dims[1]);
+        let first = i - slab - row - 1;
+        (0..27).map(move |k| first + k % 3 + k / 3 % 3 * row + k / 9 * slab)
+    }
+
+    /// Whether views agree on a surface in one of the eight voxels around `x`.
+    pub fn firm_near(&self, x: Vec3) -> bool {
+        let p = ((x - self.origin) / self.voxel).floor();
+        let n = glam::Vec3::from(self.dims.map(|n| n as f32));
+        if self.firm.is_empty() || p.cmplt(Vec3::ZERO).any() || (p + 1.0).cmpge(n).any() {
+            return false;
+        }
+        let at = |k: usize| self.index(p.x as usize + k % 2, p.y as usize + k / 2 % 2, p.z as usize + k / 4);
+        (0..8).any(|k| self.firm[at(k)])
     }
 
     fn seen_solid(&self, i: usize) -> bool {

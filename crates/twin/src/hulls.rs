@@ -31,7 +31,9 @@ pub fn decompose(mesh: &TriMesh, config: &HullConfig) -> (Vec<TriMesh>, usize) {
         max_convex_hulls: config.max_hulls,
         ..Default::default()
     };
-    let pieces = VHACD::decompose(&parameters, &points, &mesh.faces, false).compute_convex_hulls(4);
+    // Pieces without any voxel come back empty.
+    let mut pieces = VHACD::decompose(&parameters, &points, &mesh.faces, false).compute_convex_hulls(4);
+    pieces.retain(|(vertices, _)| !vertices.is_empty());
     let total = pieces.len();
     let (lo, hi) = mesh.bounds().unwrap_or_default();
     let thinnest = 1e-3 * (hi - lo).length();

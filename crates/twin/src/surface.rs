@@ -83,9 +83,19 @@ pub fn extract(field: &Field) -> TriMesh {
     mesh
 }
 
-/// Keeps the connected pieces whose area is at least `fraction` of the largest's.
-pub fn drop_crumbs(mesh: &TriMesh, fraction: f64) -> TriMesh {
+/// Vertices of the smallest piece that can be more than a few stray voxels.
+const SMALLEST: usize = 24;
+
+/// Keeps the connected pieces whose area is at least `fraction` of the largest's, and smaller ones that are `firm` at half of their
+/// vertices or more: a handle stands off its door.
+pub fn drop_crumbs(mesh: &TriMesh, fraction: f64, firm: &dyn Fn(Vec3) -> bool) -> TriMesh {
     let piece = mesh.pieces(|i| i);
+    let mut sure = std::collections::BTreeMap::<u32, (usize, usize)>::new();
+    for (&p, &x) in piece.iter().zip(&mesh.vertices) {
+        let (yes, all) = sure.entry(p as u32).or_default();
+        *yes += usize::from(firm(x));
+        *all += 1;
+    }
     let mut area = std::collections::BTreeMap::<u32, f64>::new();
     for f in &mesh.faces {
         let [a, b, c] = f.map(|i| mesh.vertices[i as usize]);
@@ -95,7 +105,9 @@ pub fn drop_crumbs(mesh: &TriMesh, fraction: f64) -> TriMesh {
     let mut new_index = vec![u32::MAX; mesh.vertices.len()];
     let mut out = TriMesh::default();
     for f in &mesh.faces {
-        if area[&piece[f[0] as usize]] < fraction * largest {
+        let p = piece[f[0] as usize];
+        let (yes, all) = sure[&p];
+        if area[&p] < fraction * largest && (all < SMALLEST || 2 * yes < all) {
             continue;
         }
         out.faces.push(f.map(|i| {
@@ -126,7 +138,7 @@ mod tests {
                 }
             }
         }
-        Field { origin: Vec3::ZERO, voxel: 1.0, dims: [n; 3], known: vec![true; values.len()], values }
+        Field { origin: Vec3::ZERO, voxel: 1.0, dims: [n; 3], known: vec![true; values.len()], firm: Vec::new(), values }
     }
 
     #[test]
@@ -142,7 +154,10 @@ mod tests {
     fn crumbs_go_and_the_ball_stays() {
         let mut mesh = extract(&ball(32, 10.0));
         let faces = mesh.faces.len();
+        let crumb = extract(&ball(8, 2.5));
+        mesh.append(&crumb);
         mesh.append(&TriMesh::cuboid(Vec3::splat(40.0), Vec3::splat(40.5)));
-        assert_eq!(drop_crumbs(&mesh, 0.01).faces.len(), faces);
+        assert_eq!(drop_crumbs(&mesh, 0.1, &|_| false).faces.len(), faces);
+        assert_eq!(drop_crumbs(&mesh, 0.1, &|_| true).faces.len(), faces + crumb.faces.len());
     }
 }

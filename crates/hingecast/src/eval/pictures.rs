@@ -65,7 +65,7 @@ pub fn errors(
             let view = recording.load(f)?;
             let picture = labeller.render(&view.camera, background.0)?;
             let (w, h) = (view.camera.width, view.camera.height);
-            let photo: Vec<f32> = view.rgb.iter().map(|c| *c as f32 / 255.0).collect();
+            let photo = splat::photo(&view, background);
             let true_mask: Vec<f32> = view.mask.iter().map(|m| *m as f32).collect();
             let labels = truth.labels(&recording.frames[f].color)?;
             let one = PictureErrors {

@@ -60,6 +60,15 @@ pub fn background(recording: &Recording, cache: &ViewCache) -> Result<([f32; 3],
     Ok(colour.map_or(([0.0; 3], false), |c| (c.map(|x| x as f32 / 255.0), true)))
 }
 
+/// What a perfect twin would render for a held-out view, (h, w, 3), 0..1: the photo, and where `background` is not what it shows around
+/// the object, painted over with it.
+pub fn photo(view: &View, background: ([f32; 3], bool)) -> Vec<f32> {
+    let paint = |(i, c): (usize, &u8)| {
+        if background.1 || view.mask[i / 3] == 1 { *c as f32 / 255.0 } else { background.0[i % 3] }
+    };
+    view.rgb.iter().enumerate().map(paint).collect()
+}
+
 /// Box of the masked depth of some states, world frame. That of the first state scales every length in the settings.
 pub fn extent(context: &Context, states: &[usize]) -> Result<(glam::DVec3, glam::DVec3)> {
     let frames: Vec<usize> = states.iter().flat_map(|s| context.recording.frames_of(*s, Split::Train)).collect();

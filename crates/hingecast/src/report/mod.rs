@@ -47,7 +47,7 @@ pub fn write(run: &RunFolder) -> Result<PathBuf> {
     let (gaussians, extent) = splat::load(&run.root)?;
     let found = joints::load(&run.root)?;
     let cache = ViewCache::new(&recording, 64 << 20);
-    let background = splat::background(&recording, &cache)?.0;
+    let background = splat::background(&recording, &cache)?;
     let mut labeller = Labeller::new(&gaussians, &found.labels, run.record.threads.max(1))?;
     let centres = part_centres(&gaussians.means, &found.labels, found.tree.parts.len());
 
@@ -63,7 +63,7 @@ pub fn write(run: &RunFolder) -> Result<PathBuf> {
         let mut tiles = Vec::new();
         for f in frames {
             let view = recording.load(f)?;
-            let picture = labeller.render(&view.camera, background)?;
+            let picture = labeller.render(&view.camera, background.0)?;
             let mut image = draw::from_rgb8(&view.rgb, view.camera.width, view.camera.height);
             draw::color_parts(&mut image, &picture.parts);
             draw_axes(&mut image, &view.camera, &found.tree, &q, &centres, extent.diagonal);
@@ -81,14 +81,13 @@ pub fn write(run: &RunFolder) -> Result<PathBuf> {
         for f in recording.frames_of(state, Split::Test).into_iter().take(2) {
             let view = recording.load(f)?;
             let (w, h) = (view.camera.width, view.camera.height);
-            let picture = labeller.render(&view.camera, background)?;
-            let photo = draw::from_rgb8(&view.rgb, w, h);
-            let twin = draw::from_rgb_f32(&picture.rgb, w, h);
-            let expected: Vec<f32> = view.rgb.iter().map(|c| *c as f32 / 255.0).collect();
+            let picture = labeller.render(&view.camera, background.0)?;
+            let photo = splat::photo(&view, background);
             let file = format!("held_out_{f:05}.png");
-            let difference = draw::difference(&photo, &twin);
-            save(&folder, &file, &draw::row(&[photo, twin, difference]))?;
-            held_out.push(HeldOut { file, state, psnr: metrics::psnr(&picture.rgb, &expected) });
+            let (left, right) = (draw::from_rgb_f32(&photo, w, h), draw::from_rgb_f32(&picture.rgb, w, h));
+            let difference = draw::difference(&left, &right);
+            save(&folder, &file, &draw::row(&[left, right, difference]))?;
+            held_out.push(HeldOut { file, state, psnr: metrics::psnr(&picture.rgb, &photo) });
         }
     }
     let plot = plot::joint_values(&twin.tree, extent.diagonal);
