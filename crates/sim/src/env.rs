@@ -235,16 +235,16 @@ impl Env {
         }
     }
 
-    /// (q - closed) / (open - closed) by this model's own limits.
+    /// How far the joint is from closed, as a share of the *task's* range: that of the object which the task was made from, whatever
+    /// limits this world's joint has.
     pub fn moved(&self) -> f64 {
         let t = &self.scene.target;
-        (self.data.qpos()[t.joint.qpos] - t.closed) / (t.open - t.closed)
+        (self.data.qpos()[t.joint.qpos] - t.closed) * (t.open - t.closed).signum() / self.scene.task.travel
     }
 
-    /// How far the joint came at most, as a share of the *task's* range: a twin with wrong limits cannot hide behind them.
-    pub fn moved_of_true_range(&self) -> f64 {
-        let t = &self.scene.target;
-        (self.moved_most - self.moved_start).abs() * (t.open - t.closed).abs() / self.scene.task.travel
+    /// How far the joint came at most from where it began, share of the task's range.
+    pub fn moved_at_most(&self) -> f64 {
+        (self.moved_most - self.moved_start).abs()
     }
 
     pub fn success(&self) -> bool {

@@ -148,7 +148,10 @@ impl Expert {
         let goal = match env.scene.task.kind {
             TaskKind::Close => target.closed,
             // A little beyond the bar of one half, and never against the stop.
-            _ => target.closed + 0.7 * (target.open - target.closed),
+            _ => {
+                let range = target.open - target.closed;
+                target.closed + range.signum() * (0.7 * env.scene.task.travel).min(0.9 * range.abs())
+            }
         };
         let radius = if screw.kind.turns() { screw.distance(grasp.trans).max(0.01) } else { 1.0 };
         let step = (goal - env.joint_value()).clamp(-self.lead / radius, self.lead / radius);

@@ -27,7 +27,7 @@ pub struct SpotPath {
     pub screw: Screw,
     /// The spot when closed.
     pub spot: DVec3,
-    /// |open - closed|, rad or m.
+    /// The task's range, rad or m.
     pub travel: f64,
     kind: TaskKind,
 }
@@ -40,7 +40,7 @@ impl SpotPath {
             screw.axis = -screw.axis;
         }
         let task: &TaskSpec = &scene.task;
-        Self { screw, spot: task.grasp.trans, travel: (target.open - target.closed).abs(), kind: task.kind }
+        Self { screw, spot: task.grasp.trans, travel: task.travel, kind: task.kind }
     }
 
     /// The spot after this share of the range.

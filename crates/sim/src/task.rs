@@ -98,7 +98,7 @@ impl TaskSpec {
         Pose::new(turn * self.place.rot, self.place.trans + shift)
     }
 
-    /// Whether the task is done; `moved` = (q - closed) / (open - closed).
+    /// Whether the task is done; `moved` = |q - closed| / travel.
     pub fn done(&self, moved: f64) -> bool {
         match self.kind {
             TaskKind::Open | TaskKind::HingedBox => moved >= self.kind.goal(),

@@ -6,65 +6,51 @@
 //! closed things come out closed and have a volume. Units: scene units; frame: canonical world.
 
 use crate::slabs::Slabs;
+use crate::thin::COVER_UNIT;
 use crate::{BACKGROUND, Observation, UNKNOWN};
 use glam::Vec3;
 use hingecast_geom::{Cancelled, Pose};
 use rayon::prelude::*;
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::BTreeMap;
 use std::sync::atomic::{AtomicU32, Ordering};
 
 /// Voxels per block edge.
 const B: i32 = 8;
-const BLOCK: usize = (B * B * B) as usize;
+pub(crate) const BLOCK: usize = (B * B * B) as usize;
 /// A block needs this many surface pixels: single flying pixels at depth edges open no block.
 const MIN_HITS: u32 = 3;
 /// Rays that must agree before space without any surface counts as empty.
 const MIN_EMPTY: u16 = 2;
-/// A sheet or a bar thinner than a voxel: front and back, averaged, leave nothing negative, and pixels beside a bar look past it.
-/// Voxels with this many surface pixels are kept all the same when their average distance to the surface is below three quarters of
-/// a voxel, or when the pixels cover this share of the voxel's face in the mean over all views.
-const THIN_HITS: u32 = 4;
-const THIN_VALUE: f32 = 0.25;
-const THIN_COVER: f32 = 0.25;
-/// Unit of [`Block::cover`]: 1/256 of a voxel's face.
-const COVER_UNIT: f32 = 256.0;
-
 /// Voxels from the surface beyond which unseen space is nobody's shell.
 const SHELL: usize = 4;
 
-type Key = [i32; 3];
+pub(crate) type Key = [i32; 3];
 
 /// Blocks near the surface of one part, with the running average in them.
 pub struct PartVolume {
     pub voxel: f32,
     truncation: f32,
     hits: BTreeMap<Key, u32>,
-    blocks: Vec<Block>,
+    pub(crate) blocks: Vec<Block>,
     /// Blocks in the bounding box that hold no surface: only asked whether a ray crossed them.
     hollow: Vec<(Key, u16)>,
     lo: Key,
     hi: Key,
 }
 
-struct Block {
-    key: Key,
+pub(crate) struct Block {
+    pub(crate) key: Key,
     sum: Vec<f32>,
-    weight: Vec<f32>,
-    /// Surface pixels that fell into each voxel, and the area that they stand for.
-    hits: Vec<AtomicU32>,
-    cover: Vec<AtomicU32>,
+    pub(crate) weight: Vec<f32>,
+    /// Surface pixels that fell into each voxel, and the area that they stand for in units of 1 / [`COVER_UNIT`] of the voxel's face.
+    pub(crate) hits: Vec<AtomicU32>,
+    pub(crate) cover: Vec<AtomicU32>,
 }
 
 impl Block {
     fn new(key: Key) -> Self {
         let zeros = || (0..BLOCK).map(|_| AtomicU32::new(0)).collect();
         Self { key, sum: vec![0.0; BLOCK], weight: vec![0.0; BLOCK], hits: zeros(), cover: zeros() }
-    }
-
-    /// Whether voxel `i` holds surface for sure: enough pixels, and they cover enough of it in all views together.
-    fn firm(&self, i: usize) -> bool {
-        self.hits[i].load(Ordering::Relaxed) >= THIN_HITS
-            && self.cover[i].load(Ordering::Relaxed) as f32 >= THIN_COVER * COVER_UNIT * self.weight[i]
     }
 }
 
@@ -193,7 +179,8 @@ impl PartVolume {
             field.known[i] = value.is_some();
         };
         for b in &self.blocks {
-            (0..BLOCK).for_each(|i| set(self.index(dims, &b.key, i), (b.weight[i] > 0.0).then(|| b.sum[i] / b.weight[i])));
+            (0..BLOCK)
+                .for_each(|i| set(self.index(dims, &b.key, i), (b.weight[i] > 0.0).then(|| b.sum[i] / b.weight[i])));
         }
         for (key, empty) in &self.hollow {
             (0..BLOCK).for_each(|i| set(self.index(dims, key, i), (*empty >= MIN_EMPTY).then_some(1.0)));
@@ -214,35 +201,9 @@ impl PartVolume {
     }
 
     /// Where voxel `i` of block `key` lies in the dense field, which has an empty border of one voxel.
-    fn index(&self, dims: [usize; 3], key: &Key, i: usize) -> usize {
+    pub(crate) fn index(&self, dims: [usize; 3], key: &Key, i: usize) -> usize {
         let at = |a: usize, d: usize| ((key[a] - self.lo[a]) * B) as usize + d + 1;
         (at(0, i / 64) * dims[1] + at(1, i / 8 % 8)) * dims[0] + at(2, i % 8)
-    }
-
-    /// Notes which voxels hold surface for sure, and makes those of thin things solid that the average has lost.
-    fn keep_thin(&self, field: &mut Field) {
-        let (mut lost, mut touching) = (Vec::new(), Vec::new());
-        for b in &self.blocks {
-            for i in (0..BLOCK).filter(|&i| b.weight[i] > 0.0 && b.hits[i].load(Ordering::Relaxed) >= THIN_HITS) {
-                let at = self.index(field.dims, &b.key, i);
-                field.firm[at] = b.firm(i);
-                if !(field.values[at] >= 0.0 && (field.firm[at] || field.values[at] < THIN_VALUE)) {
-                    continue;
-                }
-                let solid = field.around(at).any(|j| field.values[j] < 0.0);
-                if solid { touching.push(at) } else { lost.push(at) }
-            }
-        }
-        // Where a bar meets its post, what lies between them is the bar's.
-        let thin: BTreeSet<usize> = lost.iter().copied().collect();
-        lost.extend(touching.into_iter().filter(|&i| field.around(i).any(|j| thin.contains(&j))));
-        let depth = |i: usize| {
-            let beside: Vec<f32> = field.beside(i).map(|j| field.values[j]).filter(|v| *v > 0.0).collect();
-            // The surface comes out a third of a voxel from the voxel's middle.
-            -0.5 * beside.iter().sum::<f32>() / beside.len().max(1) as f32
-        };
-        let depths: Vec<f32> = lost.iter().map(|&i| depth(i)).collect();
-        lost.iter().zip(depths).for_each(|(&i, depth)| field.values[i] = depth.min(-1e-3));
     }
 }
 
@@ -276,30 +237,6 @@ impl Field {
     /// What all solid voxels lie within.
     pub fn hull(&self) -> Slabs {
         Slabs::around((0..self.values.len()).filter(|&i| self.values[i] < 0.0).map(|i| self.place(i)))
-    }
-
-    /// The six voxels that share a face with voxel `i`, which is not on the border.
-    fn beside(&self, i: usize) -> impl Iterator<Item = usize> + use<> {
-        let row = self.dims[0];
-        [1, row, row * self.dims[1]].into_iter().flat_map(move |step| [i - step, i + step])
-    }
-
-    /// The voxels within one of `i` along each axis, itself included; `i` is not on the border.
-    fn around(&self, i: usize) -> impl Iterator<Item = usize> + use<> {
-        let (row, slab) = (self.dims[0], self.dims[0] * self.dims[1]);
-        let first = i - slab - row - 1;
-        (0..27).map(move |k| first + k % 3 + k / 3 % 3 * row + k / 9 * slab)
-    }
-
-    /// Whether views agree on a surface in one of the eight voxels around `x`.
-    pub fn firm_near(&self, x: Vec3) -> bool {
-        let p = ((x - self.origin) / self.voxel).floor();
-        let n = glam::Vec3::from(self.dims.map(|n| n as f32));
-        if self.firm.is_empty() || p.cmplt(Vec3::ZERO).any() || (p + 1.0).cmpge(n).any() {
-            return false;
-        }
-        let at = |k: usize| self.index(p.x as usize + k % 2, p.y as usize + k / 2 % 2, p.z as usize + k / 4);
-        (0..8).any(|k| self.firm[at(k)])
     }
 
     fn seen_solid(&self, i: usize) -> bool {

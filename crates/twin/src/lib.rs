@@ -20,6 +20,7 @@ pub mod separate;
 pub mod simplify;
 mod slabs;
 pub mod surface;
+mod thin;
 pub mod urdf;
 
 pub use build::{Config, build};

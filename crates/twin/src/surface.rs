@@ -138,7 +138,14 @@ mod tests {
                 }
             }
         }
-        Field { origin: Vec3::ZERO, voxel: 1.0, dims: [n; 3], known: vec![true; values.len()], firm: Vec::new(), values }
+        Field {
+            origin: Vec3::ZERO,
+            voxel: 1.0,
+            dims: [n; 3],
+            known: vec![true; values.len()],
+            firm: Vec::new(),
+            values,
+        }
     }
 
     #[test]

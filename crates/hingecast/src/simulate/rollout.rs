@@ -1,7 +1,7 @@
 //! A policy in seeded episodes on several worlds: the true object, its twin, spoiled ones. Episode k has the same seed everywhere,
 //! so worlds are compared in pairs (McNemar's exact test, `policy::statistics`).
 //!
-//! Two things are counted. *Success*: the joint moved as far as the task asks, by its own limits. *As true*: the part ended where the
+//! Two things are counted. *Success*: the joint moved as far as the task asks, half of the true range. *As true*: the part ended where the
 //! joint of the first world (the true object) would have it (`sim::path`): a compliant arm opens many a wrong hinge.
 
 use super::record::{ENV_NAME, episode_seed, outcome_name};
@@ -164,7 +164,7 @@ fn episode(
         steps += 1;
     }
     each(env);
-    let (outcome, moved, end) = (env.outcome(), env.moved_of_true_range(), env.grasp().trans.to_array());
+    let (outcome, moved, end) = (env.outcome(), env.moved_at_most(), env.grasp().trans.to_array());
     let off = env.off(truth);
     let off_mm = off.is_finite().then_some(1e3 * off);
     Ok(EpisodeResult { seed, outcome, steps, moved, end, off_mm, as_true: off <= truth.tolerance() })
