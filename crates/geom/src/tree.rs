@@ -73,6 +73,20 @@ pub struct Joint {
     pub limits: [f64; 2],
 }
 
+/// How sure the depth makes one of a joint: standard deviations, and what else it might be.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Certainty {
+    pub axis_deg: f64,
+    /// Scene units; 0 for a slide.
+    pub pivot: f64,
+    /// Of a state's value, mean over the states; radians or scene units.
+    pub value: f64,
+    /// The other type that was tried.
+    pub rival: JointKind,
+    /// How much worse the rival explains the recording, nats; below 10 it is not refuted.
+    pub nats: f64,
+}
+
 /// Parts and joints. Each part but the roots is the child of exactly one joint.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct KinematicTree {

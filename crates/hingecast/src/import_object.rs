@@ -126,6 +126,7 @@ pub fn import(source: &Path, out: &Path, config: &ImportConfig, progress: &Progr
         tree: object.tree.clone(),
         parts,
         doubts: changes.clone(),
+        certainty: vec![None; object.tree.joints.len()],
         diagonal,
         metric: object.metric,
         up: DVec3::Z,

@@ -2,7 +2,7 @@
 
 use crate::failure::Result;
 use glam::DVec3;
-use hingecast_geom::{KinematicTree, Pose, TriMesh};
+use hingecast_geom::{Certainty, KinematicTree, Pose, TriMesh};
 use serde::Deserialize;
 use std::path::Path;
 
@@ -13,6 +13,9 @@ pub struct TwinFile {
     pub diagonal: f64,
     pub tree: KinematicTree,
     pub doubts: Vec<String>,
+    /// Of each joint, in the tree's order; older runs do not say.
+    #[serde(default)]
+    pub certainty: Vec<Option<Certainty>>,
     pub parts: Vec<PartFile>,
 }
 

@@ -170,6 +170,7 @@ pub fn build<E: From<Cancelled> + Send>(
         tree: tree.clone(),
         parts,
         doubts,
+        certainty: vec![None; tree.joints.len()],
         diagonal: input.diagonal,
         metric: input.metric,
         up: input.up,

@@ -152,5 +152,6 @@ fn summary(twin: &Twin) -> serde_json::Value {
         "parts": parts,
         "tree": twin.tree,
         "doubts": twin.doubts,
+        "certainty": twin.certainty,
     })
 }

@@ -27,7 +27,7 @@ pub use build::{Config, build};
 pub use export::{ExportError, write};
 
 use glam::{DMat3, DVec3};
-use hingecast_geom::{Camera, KinematicTree, TriMesh};
+use hingecast_geom::{Camera, Certainty, KinematicTree, TriMesh};
 
 /// Label of a pixel whose ray meets no object: everything along it is empty.
 pub const BACKGROUND: u8 = 255;
@@ -84,6 +84,8 @@ pub struct Twin {
     pub parts: Vec<PartModel>,
     /// What a person should know before trusting this twin; the first is the gravest.
     pub doubts: Vec<String>,
+    /// Of each joint, in the tree's order, where that is known.
+    pub certainty: Vec<Option<Certainty>>,
     /// Diagonal of the object's box in the first state, scene units.
     pub diagonal: f64,
     pub metric: bool,

@@ -6,7 +6,7 @@ use super::evidence::{Evidence, Sample};
 use super::refine::{Settings, refine};
 use super::settle::{Settled, members};
 use glam::{DVec3, IVec3, Vec3};
-use hingecast_geom::{Joint, JointKind, KinematicTree};
+use hingecast_geom::{Certainty, Joint, JointKind, KinematicTree};
 use std::collections::HashMap;
 
 /// Samples count as independent evidence in groups of this size: neighbours share their noise.
@@ -29,19 +29,10 @@ const UNEXPLAINED: f64 = 0.005;
 /// Share of the part's samples that a state must confirm.
 const SEEN: f64 = 0.05;
 
-/// A rival to the type of a joint.
-#[derive(Clone, Debug, serde::Serialize, serde::Deserialize)]
-pub struct Rival {
-    pub joint: usize,
-    pub kind: JointKind,
-    /// How much worse the rival explains the recording, nats; below 10 it is not refuted.
-    pub nats: f64,
-}
-
-/// Doubts, gravest first, and the rivals that were tried. `clouds`: the part of every point of every state's cloud.
-pub fn doubts(evidence: &Evidence, found: &Settled, clouds: &[Vec<u8>], seed: u64) -> (Vec<String>, Vec<Rival>) {
+/// Doubts, gravest first, and how sure one may be of each joint. `clouds`: the part of every point of every state's cloud.
+pub fn doubts(evidence: &Evidence, found: &Settled, clouds: &[Vec<u8>], seed: u64) -> (Vec<String>, Vec<Certainty>) {
     let mut out = Vec::new();
-    let mut rivals = Vec::new();
+    let mut certainty = Vec::new();
     let tree = &found.tree;
     if tree.joints.is_empty() {
         out.push("nothing moves: one part without joints".to_string());
@@ -57,9 +48,9 @@ pub fn doubts(evidence: &Evidence, found: &Settled, clouds: &[Vec<u8>], seed: u6
                 name(rival)
             ));
         }
-        rivals.push(Rival { joint: j, kind: rival, nats });
-        let [axis, pivot, _] = found.report.sigmas[j];
-        let (axis, pivot) = (OPTIMISTIC * axis.to_degrees(), OPTIMISTIC * pivot);
+        let [axis, pivot, value] = found.report.sigmas[j].map(|sigma| OPTIMISTIC * sigma);
+        let axis = axis.to_degrees();
+        certainty.push(Certainty { axis_deg: axis, pivot, value, rival, nats });
         if axis > LOOSE_AXIS_DEG {
             out.push(format!("joint '{}': the depth says where its axis points only to {axis:.1} deg", joint.name));
         }
@@ -89,7 +80,14 @@ pub fn doubts(evidence: &Evidence, found: &Settled, clouds: &[Vec<u8>], seed: u6
             100.0 * found.unexplained
         ));
     }
-    (out, rivals)
+    if evidence.n_states() == 2 && !tree.joints.is_empty() {
+        out.push(
+            "two states only: parts that moved alike (two drawers pulled out equally far) come out as one; if that may be so, record more \
+             states, or move one part at a time"
+                .to_string(),
+        );
+    }
+    (out, certainty)
 }
 
 fn name(kind: JointKind) -> &'static str {

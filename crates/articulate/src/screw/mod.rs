@@ -33,7 +33,7 @@ mod steady;
 use cloud::DepthView;
 use evidence::Evidence;
 use glam::Vec3;
-use hingecast_geom::{Cancelled, KinematicTree, Pose, Progress};
+use hingecast_geom::{Cancelled, Certainty, KinematicTree, Pose, Progress};
 use serde::{Deserialize, Serialize};
 
 #[derive(Clone, Debug, Serialize, Deserialize)]
@@ -72,7 +72,8 @@ pub struct Found {
     /// Per state and view: camera_from_world as corrected.
     pub cameras: Vec<Vec<Pose>>,
     pub report: refine::Report,
-    pub rivals: Vec<doubts::Rival>,
+    /// Of each joint, in the tree's order.
+    pub certainty: Vec<Certainty>,
     pub doubts: Vec<String>,
 }
 
@@ -142,7 +143,7 @@ pub fn run<E: From<Cancelled>>(
         apply(&settled.rig, &mut cameras);
         labels = labels::label_clouds(&evidence, &settled.tree);
     }
-    let (doubts, rivals) = doubts::doubts(&evidence, &settled, &labels, seed);
+    let (doubts, certainty) = doubts::doubts(&evidence, &settled, &labels, seed);
     let of_state = |(state, own): (usize, &Vec<u8>)| -> Vec<Labelled> {
         let points = &evidence.clouds[state].points;
         points.iter().zip(own).map(|(point, part)| Labelled { state, point: *point, part: *part }).collect()
@@ -153,7 +154,7 @@ pub fn run<E: From<Cancelled>>(
         tree: settled.tree,
         cameras,
         report: settled.report,
-        rivals,
+        certainty,
         doubts,
     })
 }

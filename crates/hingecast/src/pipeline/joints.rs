@@ -6,7 +6,7 @@ use crate::stage::{read_json, write_json};
 use glam::{DVec3, Vec3};
 use hingecast_articulate::icp::{self, Surface};
 use hingecast_articulate::{joints, segment};
-use hingecast_geom::{KinematicTree, PointTree, Pose};
+use hingecast_geom::{Certainty, KinematicTree, PointTree, Pose};
 use serde::{Deserialize, Serialize};
 use std::path::Path;
 
@@ -27,6 +27,8 @@ pub struct JointsFile {
     pub tree: KinematicTree,
     pub labels: Vec<u8>,
     pub doubts: Vec<String>,
+    /// Of each joint, in the tree's order; `None` where the method does not know, or a person has decided.
+    pub certainty: Vec<Option<Certainty>>,
 }
 
 pub fn load(run: &Path) -> Result<JointsFile> {
@@ -84,7 +86,8 @@ pub fn run_joints(context: &Context, run: &Path, at: &Path) -> Result<()> {
     if let Some((k, best)) = best.filter(|b| b.1 < 0.5) {
         doubts.push(format!("the grouping into {k} parts is weak (silhouette {best:.2} of 1)"));
     }
-    write_json(&at.join("joints.json"), &JointsFile { tree, labels: segmentation.labels, doubts })
+    let certainty = vec![None; tree.joints.len()];
+    write_json(&at.join("joints.json"), &JointsFile { tree, labels: segmentation.labels, doubts, certainty })
 }
 
 /// Points and normals of `surface` per part: the part of the nearest gaussian within `reach`.

@@ -60,6 +60,9 @@ fn one(file: &mut JointsFile, entry: &JointOverride) -> std::result::Result<(), 
     // What was in doubt about it a person has now decided.
     let mark = format!("'{}'", joint.name);
     file.doubts.retain(|d| !(d.contains(&mark) && (entry.kind.is_some() || entry.axis.is_some())));
+    if entry.kind.is_some() || entry.axis.is_some() || entry.pivot.is_some() {
+        file.certainty[j] = None;
+    }
     let before = joint.screw;
     joint.parent = parent;
     if let Some(kind) = entry.kind {

@@ -7,10 +7,10 @@ use super::{Context, overrides};
 use crate::failure::{Failure, Result};
 use crate::stage::{read_json, write_json};
 use glam::Vec3;
-use hingecast_articulate::screw::{self, Labelled, cloud, doubts::Rival, refine::Report};
+use hingecast_articulate::screw::{self, Labelled, cloud, refine::Report};
 use hingecast_capture::{Split, View};
 use hingecast_geom::ply::{read_vertices, write_float_vertices};
-use hingecast_geom::{KinematicTree, PointTree, Pose};
+use hingecast_geom::{Certainty, KinematicTree, PointTree, Pose};
 use hingecast_splat::{Engine, SurfaceSample, Target, Views, from_surface, surface_samples};
 use hingecast_twin::{BACKGROUND, UNKNOWN};
 use rayon::prelude::*;
@@ -26,7 +26,8 @@ pub struct PartsFile {
     /// camera_from_world as corrected, by frame of the recording.
     pub cameras: BTreeMap<usize, Pose>,
     pub report: Report,
-    pub rivals: Vec<Rival>,
+    /// Of each joint, in the tree's order.
+    pub certainty: Vec<Certainty>,
     pub doubts: Vec<String>,
     /// Box of the object over all states.
     pub lo: [f32; 3],
@@ -104,7 +105,7 @@ pub fn run_parts(context: &Context, at: &Path) -> Result<()> {
         tree: found.tree,
         voxel: found.voxel,
         report: found.report,
-        rivals: found.rivals,
+        certainty: found.certainty,
         doubts: found.doubts,
         lo: extent.0.into(),
         hi: extent.1.into(),
@@ -235,7 +236,8 @@ pub fn pixel_labels(context: &Context, run: &Path, frames: &[usize]) -> Result<V
 pub fn run_joints(context: &Context, run: &Path, at: &Path) -> Result<()> {
     let found = load(run)?;
     let groups: Groups = read_json(&run.join("splat").join("groups.json"))?;
-    let mut file = JointsFile { tree: found.tree, labels: groups.labels, doubts: found.doubts };
+    let certainty = found.certainty.into_iter().map(Some).collect();
+    let mut file = JointsFile { tree: found.tree, labels: groups.labels, doubts: found.doubts, certainty };
     overrides::apply(&mut file, &context.config.joint)?;
     write_json(&at.join("joints.json"), &file)
 }

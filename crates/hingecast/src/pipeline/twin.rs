@@ -56,6 +56,7 @@ pub fn run(context: &Context, run: &Path) -> Result<Vec<String>> {
     let mut doubts = found.doubts;
     doubts.append(&mut twin.doubts);
     twin.doubts = doubts;
+    twin.certainty = found.certainty;
     let folder = run.join("twin");
     hingecast_twin::write(&twin, Some((&gaussians, &found.labels)), &folder)?;
     doubts = twin.doubts;

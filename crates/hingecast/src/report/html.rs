@@ -2,7 +2,7 @@
 
 use super::{Content, draw::PALETTE};
 use crate::stage::RunFolder;
-use hingecast_geom::JointKind;
+use hingecast_geom::{Certainty, JointKind};
 use std::fmt::Write as _;
 
 const STYLE: &str = "
@@ -71,9 +71,11 @@ fn joints(out: &mut String, content: &Content) {
     let tree = &content.twin.tree;
     let _ = write!(
         out,
-        "<h2>Joints</h2><table><tr><th>joint</th><th>type</th><th>carries</th><th>on</th><th>axis</th><th>pivot</th><th>range seen</th></tr>"
+        "<h2>Joints</h2><table><tr><th>joint</th><th>type</th><th>carries</th><th>on</th><th>axis</th><th>pivot</th><th>range seen</th><th>sure of axis</th>\
+         <th>of pivot</th><th>of values</th><th>rival</th></tr>"
     );
-    for j in &tree.joints {
+    for (k, j) in tree.joints.iter().enumerate() {
+        let sure = content.twin.certainty.get(k).and_then(Option::as_ref);
         let range = match j.screw.kind {
             JointKind::Fixed => "-".to_string(),
             JointKind::Prismatic => format!("{:.4} .. {:.4}", j.limits[0], j.limits[1]),
@@ -83,7 +85,7 @@ fn joints(out: &mut String, content: &Content) {
         let pivot = if j.screw.kind.turns() { format!("{:.4} {:.4} {:.4}", p.x, p.y, p.z) } else { "-".into() };
         let _ = write!(
             out,
-            "<tr><td>{}</td><td>{:?}</td><td>{}{}</td><td>{}</td><td>{:.4} {:.4} {:.4}</td><td>{pivot}</td><td>{range}</td></tr>",
+            "<tr><td>{}</td><td>{:?}</td><td>{}{}</td><td>{}</td><td>{:.4} {:.4} {:.4}</td><td>{pivot}</td><td>{range}</td>{}</tr>",
             escape(&j.name),
             j.screw.kind,
             chip(j.child),
@@ -91,10 +93,24 @@ fn joints(out: &mut String, content: &Content) {
             escape(&tree.parts[j.parent]),
             a.x,
             a.y,
-            a.z
+            a.z,
+            certainty(j.screw.kind, sure)
         );
     }
     let _ = write!(out, "</table>");
+}
+
+/// Four cells: standard deviations of axis, pivot and values; what else the joint might be.
+fn certainty(kind: JointKind, sure: Option<&Certainty>) -> String {
+    let Some(c) = sure else { return "<td>-</td><td>-</td><td>-</td><td>-</td>".to_string() };
+    let (pivot, value) = match kind.turns() {
+        true => (format!("{:.1e}", c.pivot), format!("{:.3} deg", c.value.to_degrees())),
+        false => ("-".to_string(), format!("{:.1e}", c.value)),
+    };
+    format!(
+        "<td class=n>{:.3} deg</td><td class=n>{pivot}</td><td class=n>{value}</td><td>{:?}: {:.0} nats worse</td>",
+        c.axis_deg, c.rival, c.nats
+    )
 }
 
 fn parts(out: &mut String, content: &Content) {
