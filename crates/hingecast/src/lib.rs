@@ -1,5 +1,6 @@
 //! The facade: stages, configuration, evaluation, reports and benches behind the `hingecast` binary.
 
+pub mod chart;
 pub mod config;
 pub mod eval;
 #[cfg(feature = "mujoco")]

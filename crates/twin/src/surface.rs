@@ -92,7 +92,7 @@ pub fn drop_crumbs(mesh: &TriMesh, fraction: f64, firm: &dyn Fn(Vec3) -> bool) -
     let piece = mesh.pieces(|i| i);
     let mut sure = std::collections::BTreeMap::<u32, (usize, usize)>::new();
     for (&p, &x) in piece.iter().zip(&mesh.vertices) {
-        let (yes, all) = sure.entry(p as u32).or_default();
+        let (yes, all) = sure.entry(p).or_default();
         *yes += usize::from(firm(x));
         *all += 1;
     }

@@ -1,38 +1,22 @@
 //! Success against twin error: one point per object and world, one panel for each way to count.
 
 use super::{Count, Row};
+use crate::chart::{self, Area, Drawn, color, dot, svg};
 use crate::report::draw::PALETTE;
-use plotters::coord::Shift;
 use plotters::prelude::*;
 
 /// Errors below this are drawn here: zero has no place on a logarithmic axis. Simulated mm.
 const LEAST: f64 = 0.01;
 
 pub fn success_against_error(rows: &[Row]) -> String {
-    let mut svg = String::new();
-    {
-        let area = SVGBackend::with_string(&mut svg, (1180, 460)).into_drawing_area();
-        // Drawing into a string cannot fail.
-        let draw = || -> std::result::Result<(), Box<dyn std::error::Error>> {
-            area.fill(&WHITE)?;
-            let panels = area.split_evenly((1, 2));
-            panel(&panels[0], rows, "success, %", |r| r.success.as_ref(), true)?;
-            panel(&panels[1], rows, "as true, %", |r| r.as_true.as_ref(), false)?;
-            area.present()?;
-            Ok(())
-        };
-        let _ = draw();
-    }
-    svg
+    svg((1180, 460), |area| {
+        let panels = area.split_evenly((1, 2));
+        panel(&panels[0], rows, "success, %", |r| r.success.as_ref(), true)?;
+        panel(&panels[1], rows, "as true, %", |r| r.as_true.as_ref(), false)
+    })
 }
 
-fn panel(
-    area: &DrawingArea<SVGBackend, Shift>,
-    rows: &[Row],
-    name: &str,
-    count: impl Fn(&Row) -> Option<&Count>,
-    legend: bool,
-) -> std::result::Result<(), Box<dyn std::error::Error>> {
+fn panel(area: &Area, rows: &[Row], name: &str, count: impl Fn(&Row) -> Option<&Count>, legend: bool) -> Drawn {
     let most = rows.iter().filter_map(|r| Some(r.error?.goal_mm)).fold(100.0, f64::max);
     let mut chart = ChartBuilder::on(area)
         .margin(10)
@@ -54,8 +38,7 @@ fn panel(
     objects.dedup();
     for (k, object) in objects.iter().enumerate() {
         // The first of the palette is the grey of the static part.
-        let [r, g, b] = PALETTE[1 + k % (PALETTE.len() - 1)];
-        let color = RGBColor(r, g, b);
+        let color = color(PALETTE[1 + k % (PALETTE.len() - 1)]);
         let points = rows.iter().filter(|row| row.object == *object).filter_map(|row| {
             let (count, error) = (count(row)?, row.error?);
             let rate = 100.0 * count.successes as f64 / row.episodes.max(1) as f64;
@@ -72,18 +55,10 @@ fn panel(
         }
         // A line through the legend needs a series that draws nothing.
         let name = object.to_string();
-        chart
-            .draw_series(std::iter::empty::<Circle<(f64, f64), i32>>())?
-            .label(name)
-            .legend(move |(x, y)| Circle::new((x + 8, y), 4, color.filled()));
+        chart.draw_series(std::iter::empty::<Circle<(f64, f64), i32>>())?.label(name).legend(dot(color));
     }
     if legend {
-        chart
-            .configure_series_labels()
-            .position(SeriesLabelPosition::LowerLeft)
-            .background_style(WHITE.mix(0.8))
-            .border_style(BLACK.mix(0.3))
-            .draw()?;
+        chart::legend(&mut chart, SeriesLabelPosition::LowerLeft)?;
     }
     Ok(())
 }

@@ -105,7 +105,7 @@ impl Steps<'_> {
         output: &Path,
         work: impl FnOnce() -> Result<()>,
     ) -> Result<String> {
-        let own = [inputs, &[&kind]].concat();
+        let own = [inputs, &[&kind, &env!("CARGO_PKG_VERSION")]].concat();
         let stamp = stamp(&own);
         if let Some(secs) = self.ledger.secs_of(name, &stamp, output) {
             self.clock.tick(kind, secs);

@@ -1,6 +1,7 @@
 //! Plots of a rollout as SVG: a rate with its interval, and how many episodes have succeeded by when.
 
 use super::draw::PALETTE;
+use crate::chart::{color, dot, legend, svg};
 use crate::simulate::rollout::{STEP_SECS, WorldResult};
 use plotters::prelude::*;
 
@@ -25,40 +26,22 @@ pub(super) fn interval(rate: f64, [lo, hi]: [f64; 2]) -> String {
 
 /// Share of all episodes that have succeeded by a time, a line a world; a little farther than the last success.
 pub(super) fn success_over_time(results: &[WorldResult], horizon: usize) -> String {
-    let mut svg = String::new();
     let last = results.iter().flat_map(|r| &r.results).filter(|e| e.won()).map(|e| e.steps).max();
     let until = last.map_or(horizon, |steps| (steps + steps / 4).min(horizon));
-    {
-        let area = SVGBackend::with_string(&mut svg, (720, 300)).into_drawing_area();
-        // Drawing into a string cannot fail.
-        let draw = || -> Result<(), Box<dyn std::error::Error>> {
-            let mut chart = ChartBuilder::on(&area)
-                .margin(8)
-                .x_label_area_size(32)
-                .y_label_area_size(44)
-                .build_cartesian_2d(0.0..secs(until), 0.0..104.0)?;
-            chart.configure_mesh().x_desc("s").y_desc("% of the episodes").light_line_style(WHITE).draw()?;
-            for (k, r) in results.iter().enumerate() {
-                let [red, green, blue] = PALETTE[ORDER[k % ORDER.len()]];
-                let color = RGBColor(red, green, blue);
-                let line = LineSeries::new(steps_up(r, until), color.stroke_width(2));
-                chart
-                    .draw_series(line)?
-                    .label(&r.name)
-                    .legend(move |(x, y)| Circle::new((x + 8, y), 4, color.filled()));
-            }
-            chart
-                .configure_series_labels()
-                .position(SeriesLabelPosition::MiddleRight)
-                .background_style(WHITE.mix(0.8))
-                .border_style(BLACK.mix(0.3))
-                .draw()?;
-            area.present()?;
-            Ok(())
-        };
-        let _ = draw();
-    }
-    svg
+    svg((720, 300), |area| {
+        let mut chart = ChartBuilder::on(area)
+            .margin(8)
+            .x_label_area_size(32)
+            .y_label_area_size(44)
+            .build_cartesian_2d(0.0..secs(until), 0.0..104.0)?;
+        chart.configure_mesh().x_desc("s").y_desc("% of the episodes").light_line_style(WHITE).draw()?;
+        for (k, r) in results.iter().enumerate() {
+            let color = color(PALETTE[ORDER[k % ORDER.len()]]);
+            let line = LineSeries::new(steps_up(r, until), color.stroke_width(2));
+            chart.draw_series(line)?.label(&r.name).legend(dot(color));
+        }
+        legend(&mut chart, SeriesLabelPosition::MiddleRight)
+    })
 }
 
 /// (s, %) corners of the stairs: up at every success, flat between.

@@ -1,6 +1,7 @@
 //! What is in a file of demonstrations: a list, a plot, and a replay that must reproduce the recorded states to the bit.
 
 use super::record::WorldArgs;
+use crate::chart::svg;
 use crate::failure::{Failure, Result};
 use hingecast_geom::Progress;
 use hingecast_policy::{Demos, Episode};
@@ -94,27 +95,19 @@ pub fn plot(demos: &Demos) -> String {
     let all = || lines.iter().flatten();
     let longest = all().map(|p| p.0).fold(1.0, f64::max);
     let (lo, hi) = all().fold((f64::MAX, f64::MIN), |(lo, hi), p| (lo.min(p.1), hi.max(p.1)));
-    let mut svg = String::new();
     if lines.is_empty() || !(lo < hi) {
-        return svg;
+        return String::new();
     }
-    {
-        let area = SVGBackend::with_string(&mut svg, (900, 360)).into_drawing_area();
-        // Drawing into a string cannot fail.
-        let draw = || -> std::result::Result<(), Box<dyn std::error::Error>> {
-            let mut chart = ChartBuilder::on(&area)
-                .margin(8)
-                .x_label_area_size(32)
-                .y_label_area_size(52)
-                .build_cartesian_2d(0.0..longest, lo..hi)?;
-            chart.configure_mesh().x_desc("s").y_desc("gripper height, m").light_line_style(WHITE).draw()?;
-            for line in &lines {
-                chart.draw_series(LineSeries::new(line.iter().copied(), BLUE.mix(0.25)))?;
-            }
-            area.present()?;
-            Ok(())
-        };
-        let _ = draw();
-    }
-    svg
+    svg((900, 360), |area| {
+        let mut chart = ChartBuilder::on(area)
+            .margin(8)
+            .x_label_area_size(32)
+            .y_label_area_size(52)
+            .build_cartesian_2d(0.0..longest, lo..hi)?;
+        chart.configure_mesh().x_desc("s").y_desc("gripper height, m").light_line_style(WHITE).draw()?;
+        for line in &lines {
+            chart.draw_series(LineSeries::new(line.iter().copied(), BLUE.mix(0.25)))?;
+        }
+        Ok(())
+    })
 }

@@ -1,5 +1,6 @@
 //! Losses over steps, and scores over settings, as SVG plots.
 
+use crate::chart::{color, dot, legend, svg};
 use crate::report::draw::PALETTE;
 use hingecast_policy::train::LossRecord;
 use plotters::prelude::*;
@@ -39,44 +40,35 @@ fn range(values: impl Iterator<Item = f64>) -> std::ops::Range<f64> {
 }
 
 fn chart(series: &[Series], x: &str, y: &str) -> String {
-    let mut svg = String::new();
     let all = || series.iter().flat_map(|s| &s.points);
     let (x_range, y_range) = (range(all().map(|p| p.0)), range(all().map(|p| p.1)));
-    {
-        let area = SVGBackend::with_string(&mut svg, (720, 320)).into_drawing_area();
-        // Drawing into a string cannot fail.
-        let draw = || -> std::result::Result<(), Box<dyn std::error::Error>> {
-            area.fill(&WHITE)?;
-            let mut chart = ChartBuilder::on(&area)
-                .margin(8)
-                .x_label_area_size(32)
-                .y_label_area_size(60)
-                .build_cartesian_2d(x_range, y_range)?;
-            // No trailing digits: 0.3, 200.
-            let label = |v: &f64| ((v * 1e6).round() / 1e6).to_string();
-            let mut mesh = chart.configure_mesh();
-            mesh.x_desc(x).y_desc(y).x_label_formatter(&label).light_line_style(WHITE).draw()?;
-            for Series { name, color: [r, g, b], points, lines } in series {
-                let color = RGBColor(*r, *g, *b);
-                let drawn = if *lines {
-                    // A single validation has no line.
-                    if points.len() == 1 {
-                        chart.draw_series([Circle::new(points[0], 3, color.filled())])?;
-                    }
-                    chart.draw_series(LineSeries::new(points.iter().copied(), color.stroke_width(2)))?
-                } else {
-                    chart.draw_series(points.iter().map(|p| Circle::new(*p, 4, color.filled())))?
-                };
-                drawn.label(*name).legend(move |(x, y)| Circle::new((x + 8, y), 4, color.filled()));
-            }
-            // One series is named by its axis, and a legend may hide a point.
-            if series.len() > 1 {
-                chart.configure_series_labels().background_style(WHITE.mix(0.8)).border_style(BLACK.mix(0.3)).draw()?;
-            }
-            area.present()?;
-            Ok(())
-        };
-        let _ = draw();
-    }
-    svg
+    svg((720, 320), |area| {
+        let mut chart = ChartBuilder::on(area)
+            .margin(8)
+            .x_label_area_size(32)
+            .y_label_area_size(60)
+            .build_cartesian_2d(x_range, y_range)?;
+        // No trailing digits: 0.3, 200.
+        let label = |v: &f64| ((v * 1e6).round() / 1e6).to_string();
+        let mut mesh = chart.configure_mesh();
+        mesh.x_desc(x).y_desc(y).x_label_formatter(&label).light_line_style(WHITE).draw()?;
+        for Series { name, color: rgb, points, lines } in series {
+            let color = color(*rgb);
+            let drawn = if *lines {
+                // A single validation has no line.
+                if points.len() == 1 {
+                    chart.draw_series([Circle::new(points[0], 3, color.filled())])?;
+                }
+                chart.draw_series(LineSeries::new(points.iter().copied(), color.stroke_width(2)))?
+            } else {
+                chart.draw_series(points.iter().map(|p| Circle::new(*p, 4, color.filled())))?
+            };
+            drawn.label(*name).legend(dot(color));
+        }
+        // One series is named by its axis, and a legend may hide a point.
+        if series.len() > 1 {
+            legend(&mut chart, SeriesLabelPosition::MiddleRight)?;
+        }
+        Ok(())
+    })
 }

@@ -1,10 +1,10 @@
-//! `hingecast experiment`: the whole chain of verbs for each object, and one table.
+//! One object of an experiment: each step done, or found done.
 
-use super::{Outcome, Session, bench, build, synth};
-use crate::cli;
-use hingecast::config::{Config, Method};
-use hingecast::experiment::steps::{Clock, Ledger, Steps};
-use hingecast::experiment::{Demonstrated, Experiment, Row, TwinError, World, plot, table};
+use super::plan::Plan;
+use crate::verbs::{Session, bench};
+use hingecast::config::Method;
+use hingecast::experiment::steps::Steps;
+use hingecast::experiment::{Demonstrated, Row, TwinError, World};
 use hingecast::failure::{Failure, Result};
 use hingecast::import_object::{ImportConfig, import};
 use hingecast::pipeline::{self, Span};
@@ -15,139 +15,16 @@ use hingecast::stage::{RunFolder, read_json, write_json};
 use hingecast::{report, training};
 use hingecast_capture::Recording;
 use hingecast_capture::object::ArticulatedObject;
-use hingecast_capture::synth::SynthConfig;
-use hingecast_geom::ply::write_whole;
 use hingecast_policy::Policy;
 use hingecast_policy::demos::{read, write};
-use hingecast_policy::train::TrainConfig;
 use hingecast_sim::trial::make_task;
 use hingecast_sim::{Scene, SceneConfig, Spoil, SpotPath, TaskKind, TaskSpec, object};
 use serde::{Deserialize, Serialize};
-use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
-/// The worlds besides the true object.
-const WORLDS: [&str; 11] =
-    ["twin", "track", "axis=3", "axis=10", "axis=30", "pivot=3", "pivot=10", "pivot=30", "limits=0.5", "edge", "back"];
 /// Seeds of demonstrations and episodes: no policy is asked about a start that it was shown.
 const DEMO_SEED: u64 = 0;
 const EPISODE_SEED: u64 = 1;
-
-/// Everything resolved before the first step: a typing error must not wait an hour.
-struct Plan<'a> {
-    args: &'a cli::Experiment,
-    worlds: Vec<(String, World)>,
-    synth: SynthConfig,
-    twin: Config,
-    track: Config,
-    training: Vec<TrainConfig>,
-}
-
-impl<'a> Plan<'a> {
-    fn new(args: &'a cli::Experiment) -> Result<Self> {
-        let names: Vec<String> =
-            if args.worlds.is_empty() { WORLDS.map(String::from).to_vec() } else { args.worlds.clone() };
-        let worlds = names.into_iter().map(|n| Ok((n.clone(), World::read(&n)?))).collect::<Result<_>>()?;
-        let twin = build::config(&args.build)?;
-        let preset =
-            serde_json::from_value(args.policy.clone().into()).expect("the flag takes the presets' names only");
-        let training = (0..args.train_seeds).map(|k| {
-            let set: Vec<String> = args.policy_set.iter().cloned().chain([format!("seed={k}")]).collect();
-            training::resolve(preset, None, &set)
-        });
-        Ok(Self {
-            args,
-            worlds,
-            synth: synth::config(&args.synth, args.recording_seed, true)?,
-            track: Config { method: Method::Track, ..twin.clone() },
-            twin,
-            training: training.collect::<Result<_>>()?,
-        })
-    }
-
-    fn has(&self, world: &World) -> bool {
-        self.worlds.iter().any(|(_, w)| w == world)
-    }
-
-    fn needs_recording(&self) -> bool {
-        [World::Twin, World::Track, World::Back].iter().any(|w| self.has(w))
-    }
-
-    fn needs_twin(&self) -> bool {
-        self.has(&World::Twin) || self.has(&World::Back)
-    }
-
-    fn episodes_in(&self, world: &World) -> usize {
-        let n = self.args.episodes;
-        if matches!(world, World::Spoiled(_)) { self.args.spoiled_episodes.unwrap_or(n).min(n) } else { n }
-    }
-
-    /// Steps of each kind for one object: what the time left is reckoned with.
-    fn steps(&self) -> BTreeMap<&'static str, usize> {
-        let (seeds, back) = (self.args.train_seeds, usize::from(self.has(&World::Back)));
-        BTreeMap::from([
-            ("record", usize::from(self.needs_recording())),
-            ("build", usize::from(self.needs_twin())),
-            ("track", usize::from(self.has(&World::Track))),
-            ("demos", 1 + back),
-            ("train", seeds * (1 + back)),
-            ("rollout", seeds * (1 + self.worlds.len())),
-        ])
-    }
-
-    fn settings(&self) -> serde_json::Value {
-        let a = self.args;
-        let worlds: Vec<&String> = self.worlds.iter().map(|(name, _)| name).collect();
-        serde_json::json!({
-            "worlds": worlds, "demos": a.demos, "episodes": a.episodes, "spoiled_episodes": a.spoiled_episodes,
-            "recording": self.synth, "recordings": a.recordings, "runs": a.runs, "build": self.twin, "training": self.training,
-        })
-    }
-}
-
-pub fn run(session: &Session, args: &cli::Experiment) -> Result<Outcome> {
-    let plan = Plan::new(args)?;
-    let names = bench::objects(&args.objects)?;
-    for name in &names {
-        ArticulatedObject::resolve(name)?;
-    }
-    Experiment::may_become(&args.out)?;
-    std::fs::create_dir_all(&args.out).map_err(Failure::io(&args.out))?;
-    let mut experiment = Experiment { settings: plan.settings(), demonstrated: Vec::new(), rows: Vec::new() };
-    let mut clock = Clock::new(plan.steps(), names.len());
-    for argument in &names {
-        clock.next_object();
-        // An object that was given by its path has the name of its folder.
-        let name = Path::new(argument).file_name().map_or(argument.clone(), |n| n.to_string_lossy().into_owned());
-        let root = args.out.join(&name);
-        std::fs::create_dir_all(&root).map_err(Failure::io(&root))?;
-        let steps = Steps { ui: &session.ui, object: &name, ledger: Ledger::open(&root), clock: &mut clock };
-        let mut cast = Cast { session, plan: &plan, argument, name: &name, root, steps, demonstrated: Vec::new() };
-        let rows = cast.rows()?;
-        experiment.demonstrated.extend(cast.demonstrated);
-        experiment.rows.extend(rows);
-        // After every object: what is killed on the way leaves what it has.
-        save(&experiment, &args.out)?;
-    }
-    session.ui.say(&format!("\n{}", table::markdown(&experiment)));
-    session.ui.say(&format!("table and plot: {}", args.out.join("experiment.{md,csv,json,svg}").display()));
-    session.answer(&experiment);
-    let measured = experiment.rows.iter().any(|r| r.failed.is_none());
-    Ok(if measured { Outcome::Done } else { Outcome::UnderBar })
-}
-
-fn save(experiment: &Experiment, out: &Path) -> Result<()> {
-    write_json(&out.join("experiment.json"), experiment)?;
-    let texts = [
-        ("experiment.md", table::markdown(experiment)),
-        ("experiment.csv", table::csv(experiment)),
-        ("experiment.svg", plot::success_against_error(&experiment.rows)),
-    ];
-    texts.into_iter().try_for_each(|(name, text)| {
-        let path = out.join(name);
-        write_whole(&path, text.as_bytes()).map_err(Failure::io(&path))
-    })
-}
 
 /// A model file that the arm can act on, and the stamp of what it was made from.
 #[derive(Clone)]
@@ -177,19 +54,19 @@ type Episodes = Vec<Vec<EpisodeResult>>;
 type Maybe<T> = std::result::Result<T, String>;
 
 /// One object.
-struct Cast<'a> {
-    session: &'a Session,
-    plan: &'a Plan<'a>,
+pub struct Cast<'a> {
+    pub session: &'a Session,
+    pub plan: &'a Plan<'a>,
     /// As on the command line, and as in the table.
-    argument: &'a str,
-    name: &'a str,
-    root: PathBuf,
-    steps: Steps<'a>,
-    demonstrated: Vec<Demonstrated>,
+    pub argument: &'a str,
+    pub name: &'a str,
+    pub root: PathBuf,
+    pub steps: Steps<'a>,
+    pub demonstrated: Vec<Demonstrated>,
 }
 
 impl Cast<'_> {
-    fn rows(&mut self) -> Result<Vec<Row>> {
+    pub fn rows(&mut self) -> Result<Vec<Row>> {
         let plan = self.plan;
         let truth = self.object();
         let truth = match self.caught(truth)? {
