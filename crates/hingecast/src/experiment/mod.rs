@@ -54,7 +54,7 @@ pub struct TwinError {
     pub axis_deg: f64,
     /// From the foot of the spot on the true axis to this world's axis, simulated mm; `None` for slides.
     pub pivot_mm: Option<f64>,
-    /// Between the spots where this world and the true object believe that the task is done, simulated mm. Limits count here.
+    /// Between the spots where this world's joint and the true one have moved as far as the task asks, simulated mm.
     pub goal_mm: f64,
 }
 
