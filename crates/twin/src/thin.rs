@@ -20,16 +20,11 @@ const COVER_OF_TWO: f32 = 0.3;
 impl PartVolume {
     /// Notes in `field` which voxels hold surface for sure, and makes those of thin things solid that the average has lost.
     pub(crate) fn keep_thin(&self, field: &mut Field) {
-        let seen = |b: usize| {
-            let block = &self.blocks[b];
-            (0..BLOCK).filter(move |&i| block.weight[i] > 0.0)
-        };
-        let place = |b: usize, i: usize| self.index(field.dims, &self.blocks[b].key, i);
         let mut cover = vec![0.0f32; field.values.len()];
         let mut touched = Vec::new();
-        for b in 0..self.blocks.len() {
-            for i in seen(b) {
-                let (block, at) = (&self.blocks[b], place(b, i));
+        for block in &self.blocks {
+            for i in (0..BLOCK).filter(|&i| block.weight[i] > 0.0) {
+                let at = self.index(field.dims, &block.key, i);
                 cover[at] = block.cover[i].load(Ordering::Relaxed) as f32 / COVER_UNIT / block.weight[i];
                 if block.hits[i].load(Ordering::Relaxed) >= HITS {
                     touched.push(at);

@@ -42,7 +42,7 @@ fn ray_box(o: DVec3, d: DVec3, lo: DVec3, hi: DVec3) -> Option<f64> {
     (near <= far && near > 0.0).then_some(near)
 }
 
-fn observe(state: usize, view: usize) -> Observation {
+fn observe(parts: &[Slabs; 2], state: usize, view: usize) -> Observation {
     let angle = view as f64 * 2.4;
     let height = 0.1 + 0.9 * (view as f64 + 0.5) / 24.0;
     let ring = (1.0 - height * height).max(0.0).sqrt();
@@ -50,7 +50,6 @@ fn observe(state: usize, view: usize) -> Observation {
     let eye = target + 1.2 * DVec3::new(ring * angle.cos(), ring * angle.sin(), height);
     let camera = Camera::look_at(eye, target, DVec3::Z, 160, 160, 0.7);
     let poses = tree().poses_at(state);
-    let parts = slabs();
     let mut seen = Observation {
         state,
         camera,
@@ -89,7 +88,8 @@ fn sizes_masses_and_joints_come_back() {
         metric: true,
         up: DVec3::Z,
     };
-    let load = |i: usize| Ok::<_, Cancelled>(observe(i / 24, i % 24));
+    let parts = slabs();
+    let load = |i: usize| Ok::<_, Cancelled>(observe(&parts, i / 24, i % 24));
     let config = Config { voxel: 1.0 / 128.0, ..Default::default() };
     let twin = build(&input, &load, &config, &Progress::default()).unwrap();
     assert!(twin.doubts.is_empty(), "{:?}", twin.doubts);
@@ -143,7 +143,7 @@ fn a_recording_in_which_no_part_was_found_to_move_has_a_twin_of_one_part() {
         up: DVec3::Z,
     };
     let load = |i: usize| {
-        let mut seen = observe(i / 8, 3 * (i % 8));
+        let mut seen = observe(&slabs(), i / 8, 3 * (i % 8));
         seen.labels.iter_mut().filter(|l| **l != BACKGROUND).for_each(|l| *l = 0);
         Ok::<_, Cancelled>(seen)
     };
@@ -151,4 +151,41 @@ fn a_recording_in_which_no_part_was_found_to_move_has_a_twin_of_one_part() {
     let twin = build(&input, &load, &config, &Progress::default()).unwrap();
     assert_eq!(twin.parts.len(), 1);
     assert!(!twin.parts[0].mesh.is_empty());
+}
+
+/// A bar of half a voxel, less than half a pixel wide, between two posts on the lid: what a hand would hold.
+#[test]
+fn a_thin_handle_stays_on_its_door() {
+    let mut parts = slabs();
+    let v = DVec3::new;
+    parts[1].extend([
+        (v(-0.01, -0.07, 0.22), v(0.01, -0.05, 0.26)),
+        (v(-0.01, 0.05, 0.22), v(0.01, 0.07, 0.26)),
+        (v(-0.001, -0.05, 0.25), v(0.001, 0.05, 0.252)),
+    ]);
+    let tree = tree();
+    let input = Input {
+        name: "box",
+        tree: &tree,
+        n_states: 4,
+        n_observations: 4 * 24,
+        diagonal: 0.55,
+        metric: true,
+        up: DVec3::Z,
+    };
+    let load = |i: usize| Ok::<_, Cancelled>(observe(&parts, i / 24, i % 24));
+    let config = Config { voxel: 1.0 / 128.0, ..Default::default() };
+    let twin = build(&input, &load, &config, &Progress::default()).unwrap();
+    let bar = |points: &[glam::Vec3], y: f32| {
+        points.iter().any(|p| (p.y - y).abs() < 0.006 && p.x.abs() < 0.006 && (p.z - 0.251).abs() < 0.006)
+    };
+    let hulls: Vec<glam::Vec3> = twin.parts[1].hulls.iter().flat_map(|h| h.vertices.clone()).collect();
+    for k in -4..=4 {
+        let y = 0.01 * k as f32;
+        assert!(bar(&twin.parts[1].mesh.vertices, y), "the bar is broken at y = {y}");
+    }
+    assert!(hulls.iter().filter(|p| p.z > 0.24 && p.x.abs() < 0.006 && p.y.abs() < 0.055).count() >= 4);
+    // And nothing is made of what no bar is: the space between bar and lid is empty.
+    let between = |p: &&glam::Vec3| p.y.abs() < 0.045 && p.x.abs() < 0.1 && (0.23..0.242).contains(&p.z);
+    assert_eq!(twin.parts[1].mesh.vertices.iter().filter(between).count(), 0);
 }
