@@ -1,4 +1,4 @@
-//! What all our charts share: SVG in a string, the palette, the frame about a legend.
+//! What all our charts share: SVG in a string, colours, marks and frames of legends.
 
 use plotters::coord::Shift;
 use plotters::prelude::*;

@@ -4,6 +4,7 @@
 use crate::fuse::Field;
 use glam::Vec3;
 use hingecast_geom::TriMesh;
+use std::collections::BTreeMap;
 
 const CORNERS: [[usize; 3]; 8] =
     [[0, 0, 0], [1, 0, 0], [0, 1, 0], [1, 1, 0], [0, 0, 1], [1, 0, 1], [0, 1, 1], [1, 1, 1]];
@@ -90,24 +91,24 @@ const SMALLEST: usize = 24;
 /// vertices or more: a handle stands off its door.
 pub fn drop_crumbs(mesh: &TriMesh, fraction: f64, firm: &dyn Fn(Vec3) -> bool) -> TriMesh {
     let piece = mesh.pieces(|i| i);
-    let mut sure = std::collections::BTreeMap::<u32, (usize, usize)>::new();
-    for (&p, &x) in piece.iter().zip(&mesh.vertices) {
-        let (yes, all) = sure.entry(p).or_default();
-        *yes += usize::from(firm(x));
-        *all += 1;
-    }
-    let mut area = std::collections::BTreeMap::<u32, f64>::new();
+    let mut area = BTreeMap::<u32, f64>::new();
     for f in &mesh.faces {
         let [a, b, c] = f.map(|i| mesh.vertices[i as usize]);
         *area.entry(piece[f[0] as usize]).or_default() += 0.5 * (b - a).cross(c - a).length() as f64;
     }
     let largest = area.values().fold(0.0f64, |a, b| a.max(*b));
+    let small = |p: &u32| area.get(p).is_some_and(|a| *a < fraction * largest);
+    // Firm vertices and all, of the small pieces.
+    let mut sure = BTreeMap::<u32, (usize, usize)>::new();
+    for (p, &x) in piece.iter().zip(&mesh.vertices).filter(|(p, _)| small(p)) {
+        let (yes, all) = sure.entry(*p).or_default();
+        *yes += usize::from(firm(x));
+        *all += 1;
+    }
     let mut new_index = vec![u32::MAX; mesh.vertices.len()];
     let mut out = TriMesh::default();
     for f in &mesh.faces {
-        let p = piece[f[0] as usize];
-        let (yes, all) = sure[&p];
-        if area[&p] < fraction * largest && (all < SMALLEST || 2 * yes < all) {
+        if sure.get(&piece[f[0] as usize]).is_some_and(|&(yes, all)| all < SMALLEST || 2 * yes < all) {
             continue;
         }
         out.faces.push(f.map(|i| {

@@ -2,7 +2,7 @@
 
 use glam::{DVec2, DVec3};
 use hingecast_geom::{Camera, Cancelled, Joint, JointKind, KinematicTree, Progress, Screw};
-use hingecast_twin::{BACKGROUND, Config, Observation, build, build::Input, write};
+use hingecast_twin::{BACKGROUND, Config, Observation, Twin, build, build::Input, write};
 
 /// Slabs of one part: lower and upper corner.
 type Slabs = Vec<(DVec3, DVec3)>;
@@ -76,8 +76,8 @@ fn observe(parts: &[Slabs; 2], state: usize, view: usize) -> Observation {
     seen
 }
 
-#[test]
-fn sizes_masses_and_joints_come_back() {
+/// From 24 views of each of the four states.
+fn twin_of(parts: &[Slabs; 2]) -> Twin {
     let tree = tree();
     let input = Input {
         name: "box",
@@ -88,10 +88,14 @@ fn sizes_masses_and_joints_come_back() {
         metric: true,
         up: DVec3::Z,
     };
-    let parts = slabs();
-    let load = |i: usize| Ok::<_, Cancelled>(observe(&parts, i / 24, i % 24));
+    let load = |i: usize| Ok::<_, Cancelled>(observe(parts, i / 24, i % 24));
     let config = Config { voxel: 1.0 / 128.0, ..Default::default() };
-    let twin = build(&input, &load, &config, &Progress::default()).unwrap();
+    build(&input, &load, &config, &Progress::default()).unwrap()
+}
+
+#[test]
+fn sizes_masses_and_joints_come_back() {
+    let twin = twin_of(&slabs());
     assert!(twin.doubts.is_empty(), "{:?}", twin.doubts);
 
     let expected: Vec<f64> =
@@ -163,19 +167,7 @@ fn a_thin_handle_stays_on_its_door() {
         (v(-0.01, 0.05, 0.22), v(0.01, 0.07, 0.26)),
         (v(-0.001, -0.05, 0.25), v(0.001, 0.05, 0.252)),
     ]);
-    let tree = tree();
-    let input = Input {
-        name: "box",
-        tree: &tree,
-        n_states: 4,
-        n_observations: 4 * 24,
-        diagonal: 0.55,
-        metric: true,
-        up: DVec3::Z,
-    };
-    let load = |i: usize| Ok::<_, Cancelled>(observe(&parts, i / 24, i % 24));
-    let config = Config { voxel: 1.0 / 128.0, ..Default::default() };
-    let twin = build(&input, &load, &config, &Progress::default()).unwrap();
+    let twin = twin_of(&parts);
     let bar = |points: &[glam::Vec3], y: f32| {
         points.iter().any(|p| (p.y - y).abs() < 0.006 && p.x.abs() < 0.006 && (p.z - 0.251).abs() < 0.006)
     };
