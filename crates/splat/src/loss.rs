@@ -4,7 +4,7 @@
 //! x' = y + w (x - y)
 //! colour = (1 - l) mean |x' - y| + l mean (1 - ssim(x', y)), over pixels and channels
 //! depth  = mean over all pixels of w rho(|D - z A|), counted where z is known; rho(e) = ln(1 + e/s) or e/s
-//! alpha  = mean over all pixels of w |A - a|, not counted on the mask's edge
+//! alpha  = mean over all pixels of w max(|A - a| - s, 0); the slack s is 0, on the mask's edge 1/2
 //!
 //! D - z A = sum of w_i (z_i - z): zero exactly when the normalised depth D / A is right, whatever the opacity, so depth is
 //! not biased towards the camera or away from it where the object is still half transparent.
@@ -44,7 +44,7 @@ pub struct LossConfig {
 
 impl Default for LossConfig {
     fn default() -> Self {
-        Self { ssim: 0.2, depth: 0.1, depth_loss: DepthLoss::Log, depth_scale: 0.01, alpha: 0.1 }
+        Self { ssim: 0.2, depth: 0.1, depth_loss: DepthLoss::Log, depth_scale: 0.01, alpha: 1.0 }
     }
 }
 
@@ -210,11 +210,11 @@ pub(crate) unsafe fn loss_band<T: Lanes>(args: &Args, band: usize) {
                 gradient[c] = signed!(e, weight) * T::splat(colour_scale);
             }
             let alpha = one - T::load(&args.image[4 * plane + at..]);
-            let (mut wanted, mut alpha_weight) = (zero, weight);
+            let (mut wanted, mut slack) = (zero, zero);
             if let Some(cx) = crop_x {
                 let i = (y - crop.y0) * padded + cx;
                 wanted = T::load(&target.alpha[i..]);
-                alpha_weight = weight * T::load(&target.alpha_weight[i..]);
+                slack = T::load(&target.alpha_slack[i..]);
                 let z = T::load(&target.depth[i..]);
                 let known = z.ge(tiny);
                 let e = T::load(&args.image[3 * plane + at..]) - z * alpha;
@@ -229,9 +229,10 @@ pub(crate) unsafe fn loss_band<T: Lanes>(args: &Args, band: usize) {
                 gradient[4] = zero - gradient[3] * z;
             }
             if target.has_mask {
-                let e = (alpha - wanted) * alpha_weight;
-                row_sums[3] = row_sums[3] + e.max(zero - e);
-                gradient[4] = gradient[4] + signed!(e, alpha_weight) * T::splat(alpha_scale);
+                let e = alpha - wanted;
+                let over = e.max(zero - e) - slack;
+                row_sums[3] = over.max(zero).fma(weight, row_sums[3]);
+                gradient[4] = gradient[4] + signed!(e, weight).keep(over.ge(tiny)) * T::splat(alpha_scale);
             }
             for (k, g) in gradient.iter().enumerate() {
                 unsafe { g.store(args.gradient.slice(k * plane + at, T::N)) };

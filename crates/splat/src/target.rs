@@ -91,10 +91,10 @@ pub struct Target {
     pub(crate) rgb: [Vec<f32>; 3],
     pub(crate) mean: [Vec<f32>; 3],
     pub(crate) variance: [Vec<f32>; 3],
-    /// (crop height, padded crop width): depth (0 = says nothing), alpha, weight of the alpha loss.
+    /// (crop height, padded crop width): depth (0 = says nothing), alpha, and how far from it alpha may be for nothing.
     pub(crate) depth: Vec<f32>,
     pub(crate) alpha: Vec<f32>,
-    pub(crate) alpha_weight: Vec<f32>,
+    pub(crate) alpha_slack: Vec<f32>,
     /// Whole picture, tile-padded rows, 0 in the padding; None when every pixel counts.
     pub(crate) weight: Option<Vec<f32>>,
 }
@@ -117,7 +117,7 @@ impl Target {
         let mut rgb = [vec![0f32; layout.len()], vec![0f32; layout.len()], vec![0f32; layout.len()]];
         let mut depth = vec![0f32; padded * crop.height];
         let mut alpha = depth.clone();
-        let mut alpha_weight = depth.clone();
+        let mut alpha_slack = depth.clone();
         for y in 0..crop.height {
             for x in 0..crop.width {
                 let i = (crop.y0 + y) * w + crop.x0 + x;
@@ -128,7 +128,7 @@ impl Target {
                         if images.shows_background { seen } else { m * seen + (1.0 - m) * images.background[c] };
                 }
                 alpha[y * padded + x] = m;
-                alpha_weight[y * padded + x] = if on_edge(&mask, i, w, h) { 0.0 } else { 1.0 };
+                alpha_slack[y * padded + x] = if on_edge(&mask, i, w, h) { EDGE_SLACK } else { 0.0 };
                 if let Some(z) = images.depth
                     && m > 0.5
                 {
@@ -158,7 +158,7 @@ impl Target {
             variance: [v0, v1, v2],
             depth,
             alpha,
-            alpha_weight,
+            alpha_slack,
             weight,
         })
     }
@@ -250,8 +250,10 @@ fn crop_of(mask: &Pixels, w: usize, h: usize) -> Crop {
     Crop { x0, y0, width: x1 - x0, height: y1 - y0 }
 }
 
-/// A binary mask does not know how much of an edge pixel is covered, so edge pixels are left out of the alpha loss: their
-/// blended colour tells it.
+/// A binary mask knows of an edge pixel only whether half of it is covered; how much more or less, its blended colour tells. But
+/// the colour alone is not enough: a rim of gaussians with the background's colour costs nothing and makes silhouettes fat.
+const EDGE_SLACK: f32 = 0.5;
+
 fn on_edge(mask: &impl Fn(usize) -> f32, i: usize, w: usize, h: usize) -> bool {
     let (x, y) = (i % w, i / w);
     let own = mask(i) > 0.5;

@@ -59,14 +59,16 @@ pub fn loss(image: &Image, target: &Target, config: &LossConfig) -> (LossTerms, 
             }
             if target.has_mask {
                 let in_crop = y >= crop.y0 && y < crop.y0 + crop.height && x >= crop.x0 && x < crop.x0 + crop.width;
-                let counts = if in_crop {
-                    Real::from(target.alpha_weight[(y - crop.y0) * crop.padded_width() + x - crop.x0])
+                let slack = if in_crop {
+                    Real::from(target.alpha_slack[(y - crop.y0) * crop.padded_width() + x - crop.x0])
                 } else {
-                    1.0
+                    0.0
                 };
-                let e = weight * counts * (alpha - Real::from(mask[i]));
-                terms.alpha += e.abs() / pixels;
-                g.alpha[i] += Real::from(config.alpha) * weight * counts * sign(e) / pixels;
+                let e = alpha - Real::from(mask[i]);
+                if e.abs() > slack {
+                    terms.alpha += weight * (e.abs() - slack) / pixels;
+                    g.alpha[i] += Real::from(config.alpha) * weight * sign(e) / pixels;
+                }
             }
         }
     }
