@@ -18,8 +18,29 @@ pub struct Discovery {
     pub tree: KinematicTree,
     /// Per part, per sample.
     pub verdicts: Vec<Vec<Verdict>>,
-    /// Contradictions that a part has to remove to be worth having.
-    pub cost: f64,
+    pub cost: Cost,
+}
+
+/// What a part costs, in contradictions that it has to remove to be worth having.
+#[derive(Clone, Copy)]
+pub struct Cost {
+    /// For its screw and its values.
+    part: f64,
+    /// For what is explained by chance, share of what is left to explain.
+    chance: f64,
+}
+
+impl Cost {
+    /// `still`: the verdicts if nothing moved.
+    fn new(still: &[Verdict], n_states: usize) -> Self {
+        let all: f64 = still.iter().map(|v| v.against.count_ones() as f64).sum();
+        Self { part: PART_COST * all, chance: PART_COST_CHANCE / n_states as f64 }
+    }
+
+    /// Of a part where so many contradictions are left without it.
+    pub fn of(&self, left: f64) -> f64 {
+        self.part + self.chance * left
+    }
 }
 
 /// Proposals that are refined before one is chosen, and how many voxels apart they are. Few states leave a flat part free to
@@ -34,9 +55,10 @@ const LEAST: usize = 25;
 /// alternatives are followed; from [`MANY_STATES`] on the first choice has always been right.
 const BEAM: usize = 4;
 
-/// What a part costs, share of all contradictions that a single rigid thing would have: its screw and its values have to be
-/// paid for by what they explain. With few states more is explained by chance.
+/// Share of all contradictions that a single rigid thing would have: a part's screw and its values have to be paid for by what they
+/// explain.
 const PART_COST: f64 = 0.015;
+/// With few states more is explained by chance; share of what is left, times the number of states.
 const PART_COST_CHANCE: f64 = 0.06;
 
 /// A set of parts under construction.
@@ -59,8 +81,7 @@ pub fn discover(
     let verdicts = vec![evidence.judge(&vec![Pose::IDENTITY; n_states])];
     let tree = KinematicTree { parts: vec!["base".to_string()], joints: Vec::new() };
     let open = open_samples(&verdicts);
-    let share = PART_COST + PART_COST_CHANCE / n_states as f64;
-    let cost = share * verdicts[0].iter().map(|v| v.against.count_ones() as f64).sum::<f64>();
+    let cost = Cost::new(&verdicts[0], n_states);
     let mut front = vec![Node { tree, verdicts, open, merit: 0.0 }];
     let mut best: Option<Node> = None;
     let width = if n_states < MANY_STATES { BEAM } else { 1 };
@@ -68,7 +89,7 @@ pub fn discover(
         progress.report(round, max_parts, &format!("{} parts", round + 1))?;
         let mut next: Vec<Node> = Vec::new();
         for node in front {
-            let grown = grow(evidence, &node, width, cost, seed);
+            let grown = grow(evidence, &node, width, &cost, seed);
             progress.check()?;
             next.extend(grown);
             if best.as_ref().is_none_or(|b| node.merit > b.merit) {
@@ -90,7 +111,8 @@ pub fn discover(
 }
 
 /// The `width` best ways to add a part.
-fn grow(evidence: &mut Evidence, node: &Node, width: usize, cost: f64, seed: u64) -> Vec<Node> {
+fn grow(evidence: &mut Evidence, node: &Node, width: usize, cost: &Cost, seed: u64) -> Vec<Node> {
+    let cost = cost.of(node.open.iter().map(|&i| contradictions(&node.verdicts, i)).sum());
     let n_states = evidence.n_states();
     let least = ((LEAST_SHARE * evidence.samples.len() as f64) as usize).max(LEAST);
     if node.open.len() < least {

@@ -8,6 +8,7 @@
 //! propose        the best of these, aligned, per parent     adopt      a proposal refined into a part
 //! discover       parts one after another, by what they explain (jury) and how usual they are (plausible)
 //! settle         states' frames, all joints together (refine)
+//! straight       axes along their part's faces, where that explains as much
 //! labels         which part a sample belongs to
 //! steady         noisy recordings: every view aligned to what stands still, then settled again
 //! doubts         rivals, covariance, what was hardly seen
@@ -29,6 +30,7 @@ mod scan;
 pub mod settle;
 pub mod space;
 mod steady;
+mod straight;
 
 use cloud::DepthView;
 use evidence::Evidence;

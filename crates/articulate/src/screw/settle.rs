@@ -3,18 +3,17 @@
 
 use super::adopt::asked_again;
 use super::cameras::{mean_point, without_mean};
-use super::discover::{Discovery, poses_of};
-use super::doubts::{REFUTED, behind, rival, two_unknowns};
+use super::discover::{Cost, Discovery, poses_of};
+use super::doubts::{REFUTED, rival};
 use super::evidence::{Evidence, Motion, Sample, Verdict, contradictions};
 use super::hypotheses::nearest_screw;
 use super::labels::label;
-use super::propose::MANY_STATES;
 use super::refine::{Report, Settings, refine};
+use super::straight::straighten;
 use crate::icp::{self, Surface};
 use glam::{DVec3, Vec3};
 use hingecast_geom::pose::rotation_vector;
 use hingecast_geom::{JointKind, KinematicTree, Pose, Screw};
-use nalgebra::{Matrix3, Vector3};
 use rayon::prelude::*;
 
 /// The final tree, and what it was found with.
@@ -36,7 +35,7 @@ const FEW: usize = 150;
 /// Pull towards the state's own frame in directions that its base leaves open, share of the pull towards the surface.
 const TETHER: f64 = 0.003;
 /// A settled tree to settle again on other evidence.
-pub fn again(evidence: &Evidence, tree: KinematicTree, cost: f64) -> Discovery {
+pub fn again(evidence: &Evidence, tree: KinematicTree, cost: Cost) -> Discovery {
     Discovery { verdicts: judge_all(evidence, &tree), tree, cost }
 }
 
@@ -50,11 +49,11 @@ pub fn settle(evidence: &mut Evidence, found: &Discovery, seed: u64) -> Settled 
     let mut verdicts = prune(evidence, &mut tree, found.cost);
     labels = label(evidence, &verdicts);
     slides(evidence, &mut tree, &labels, seed);
-    simplify(evidence, &mut tree, &labels);
     let free = vec![true; tree.joints.len()];
     let noisy = evidence.is_noisy();
     let mut report = Report::default();
     for round in 0..3 {
+        simplify(evidence, &mut tree, &labels);
         if noisy {
             let moved = frames(evidence, &labels, seed);
             for (r, m) in rig.iter_mut().zip(&moved) {
@@ -67,9 +66,7 @@ pub fn settle(evidence: &mut Evidence, found: &Discovery, seed: u64) -> Settled 
         let gate = if round == 0 { 1.0 } else { 0.6 } * voxel;
         let settings = Settings { gates: [gate, 0.5 * gate], rounds: 6, partners: 6 };
         report = refine(evidence, &mut tree, &members, &free, &settings, seed ^ round);
-        if n_states < MANY_STATES {
-            straighten(evidence, &mut tree, &labels, seed);
-        }
+        straighten(evidence, &mut tree, &labels, seed);
         verdicts = judge_all(evidence, &tree);
         labels = label(evidence, &verdicts);
     }
@@ -127,50 +124,6 @@ fn slides(evidence: &Evidence, tree: &mut KinematicTree, labels: &[u8], seed: u6
     }
 }
 
-/// Faces within this angle of the axis, or of square to it, radians, say where it points.
-const NEARLY: f64 = 0.09;
-
-/// Lets slides run along their part's own faces where the recording does not contradict that. A closed drawer shows its front alone, and in
-/// two states nothing else tells whether it rises by a degree on its way: two unknowns less are worth their share of evidence.
-fn straighten(evidence: &Evidence, tree: &mut KinematicTree, labels: &[u8], seed: u64) {
-    let voxel = evidence.lattice.voxel as f64;
-    // One round answers the cost of what it is given.
-    let settings = Settings { gates: [0.6 * voxel, 0.6 * voxel], rounds: 1, partners: 6 };
-    for j in 0..tree.joints.len() {
-        let axis = tree.joints[j].screw.axis;
-        if tree.joints[j].screw.kind != JointKind::Prismatic {
-            continue;
-        }
-        let own = members(evidence, labels, tree.joints[j].child);
-        let back: Vec<Pose> =
-            poses_of(tree, tree.joints[j].parent, evidence.n_states()).iter().map(Pose::inverse).collect();
-        // The axis is along the first faces and square to the second ones.
-        let mut spread = Matrix3::zeros();
-        for (s, _) in &own {
-            let n = back[s.state].rotate(s.normal.as_dvec3());
-            let (along, n) = (n.dot(axis).abs(), Vector3::new(n.x, n.y, n.z));
-            if along > NEARLY.cos() {
-                spread -= n * n.transpose();
-            } else if along < NEARLY.sin() {
-                spread += n * n.transpose();
-            }
-        }
-        let eigen = spread.symmetric_eigen();
-        let d = eigen.eigenvectors.column(eigen.eigenvalues.imin());
-        let d = DVec3::new(d[0], d[1], d[2]);
-        if d.dot(axis).abs() < NEARLY.cos() {
-            continue;
-        }
-        let mut straight = tree.clone();
-        straight.joints[j].screw.axis = d * d.dot(axis).signum();
-        let free: Vec<bool> = (0..tree.joints.len()).map(|k| k == j).collect();
-        let cost = |tree: &KinematicTree| refine(evidence, &mut tree.clone(), &own, &free, &settings, seed).cost;
-        if behind(own.len(), cost(&straight), cost(tree)) < two_unknowns(own.len()) {
-            *tree = straight;
-        }
-    }
-}
-
 /// Samples may be off by this many voxels when a part is hung on its grandparent.
 const ALIKE: f64 = 1.0;
 
@@ -218,18 +171,21 @@ const ASKING: usize = 500;
 
 /// Drops parts that the others make superfluous: those without children that explain less than they cost. Answers the
 /// verdicts of what is left.
-fn prune(evidence: &Evidence, tree: &mut KinematicTree, cost: f64) -> Vec<Vec<Verdict>> {
+fn prune(evidence: &Evidence, tree: &mut KinematicTree, cost: Cost) -> Vec<Vec<Verdict>> {
     let mut verdicts = judge_all(evidence, tree);
     loop {
+        let left = |verdicts: &[Vec<Verdict>]| (0..verdicts[0].len()).map(|i| contradictions(verdicts, i)).sum::<f64>();
+        let with = left(&verdicts);
+        // What it removes beyond its cost.
         let gain = |p: usize| {
             let mut without = verdicts.clone();
             without.remove(p);
-            let each = |i: usize| contradictions(&without, i) - contradictions(&verdicts, i);
-            (0..verdicts[0].len()).map(each).sum::<f64>()
+            let without = left(&without);
+            without - with - cost.of(without)
         };
         let leaf = |p: &usize| !tree.joints.iter().any(|j| j.parent == *p);
         let weakest = (1..tree.parts.len()).filter(leaf).map(|p| (gain(p), p)).min_by(|a, b| a.0.total_cmp(&b.0));
-        let Some((_, part)) = weakest.filter(|w| w.0 < cost) else { return verdicts };
+        let Some((_, part)) = weakest.filter(|w| w.0 < 0.0) else { return verdicts };
         tree.joints.retain(|j| j.child != part);
         for joint in &mut tree.joints {
             joint.child -= usize::from(joint.child > part);

@@ -1,0 +1,74 @@
+//! Axes along their part's own faces, or square to them, as in nearly everything that people build, where the recording does not
+//! contradict that.
+//!
+//! A closed drawer shows its front alone, and in two states nothing else tells whether it rises by a degree on its way. A closed
+//! door's front may turn in its own plane by as much without leaving it.
+
+use super::discover::poses_of;
+use super::doubts::{behind, two_unknowns};
+use super::evidence::{Evidence, Sample};
+use super::propose::MANY_STATES;
+use super::refine::{Settings, refine};
+use super::settle::members;
+use glam::DVec3;
+use hingecast_geom::{KinematicTree, Pose};
+use nalgebra::{Matrix3, Vector3};
+
+/// Faces within this angle of the axis, or of square to it, radians, say where it points.
+const NEARLY: f64 = 0.15;
+/// Faces do not know their directions better than this, radians.
+const KNOWN: f64 = 0.004;
+/// With many states an axis along the faces must explain the recording better by this many nats.
+const CLEARLY: f64 = 1.0;
+
+/// Turns axes to where their part's faces say, one joint after another. With few states they may explain the recording a little worse:
+/// two unknowns less are worth their share of evidence.
+pub fn straighten(evidence: &Evidence, tree: &mut KinematicTree, labels: &[u8], seed: u64) {
+    let voxel = evidence.lattice.voxel as f64;
+    // One round answers the cost of what it is given.
+    let ask = Settings { gates: [0.6 * voxel; 2], rounds: 1, partners: 6 };
+    let fit = Settings { gates: [1.0 * voxel, 0.6 * voxel], rounds: 4, partners: 6 };
+    for j in 0..tree.joints.len() {
+        let (child, screw) = (tree.joints[j].child, tree.joints[j].screw);
+        let own = members(evidence, labels, child);
+        let parent: Vec<Pose> = poses_of(tree, tree.joints[j].parent, evidence.n_states());
+        let Some(axis) = along_faces(&parent, &own, screw.axis).filter(|a| a.angle_between(screw.axis) > KNOWN) else {
+            continue;
+        };
+        let free: Vec<bool> = (0..tree.joints.len()).map(|k| k == j).collect();
+        let cost = |tree: &KinematicTree| refine(evidence, &mut tree.clone(), &own, &free, &ask, seed).cost;
+        let mut straight = tree.clone();
+        straight.joints[j].screw.axis = axis;
+        if screw.kind.turns() {
+            // Where it lies and how far it turns follow the new direction.
+            refine(evidence, &mut straight, &own, &free, &fit, seed);
+            straight.joints[j].screw.axis = axis;
+        }
+        let nats = behind(own.len(), cost(&straight), cost(tree));
+        let most = if evidence.n_states() < MANY_STATES { two_unknowns(own.len()) } else { -CLEARLY };
+        if nats < most {
+            *tree = straight;
+        }
+    }
+}
+
+/// The direction that the faces nearly along `axis` and nearly square to it are along and square to, as well as they can be all at
+/// once: the smallest eigenvector of the sum of n n' over the second minus that over the first. In the frame of the parent, whose poses
+/// are `parent`; none where the faces leave it open.
+fn along_faces(parent: &[Pose], own: &[(Sample, usize)], axis: DVec3) -> Option<DVec3> {
+    let mut spread = Matrix3::zeros();
+    for (s, _) in own {
+        let n = parent[s.state].inverse().rotate(s.normal.as_dvec3());
+        let (along, n) = (n.dot(axis).abs(), Vector3::new(n.x, n.y, n.z));
+        if along > NEARLY.cos() {
+            spread -= n * n.transpose();
+        } else if along < NEARLY.sin() {
+            spread += n * n.transpose();
+        }
+    }
+    let eigen = spread.symmetric_eigen();
+    let d = eigen.eigenvectors.column(eigen.eigenvalues.imin());
+    let d = DVec3::new(d[0], d[1], d[2]);
+    let d = d * d.dot(axis).signum();
+    (d.dot(axis) > NEARLY.cos()).then_some(d)
+}
