@@ -83,7 +83,7 @@ pub fn discover(
     let open = open_samples(&verdicts);
     let cost = Cost::new(&verdicts[0], n_states);
     let mut front = vec![Node { tree, verdicts, open, merit: 0.0 }];
-    let mut best: Option<Node> = None;
+    let mut done: Vec<Node> = Vec::new();
     let width = if n_states < MANY_STATES { BEAM } else { 1 };
     for round in 0..max_parts {
         progress.report(round, max_parts, &format!("{} parts", round + 1))?;
@@ -91,10 +91,10 @@ pub fn discover(
         for node in front {
             let grown = grow(evidence, &node, width, &cost, seed);
             progress.check()?;
-            next.extend(grown);
-            if best.as_ref().is_none_or(|b| node.merit > b.merit) {
-                best = Some(node);
+            if grown.is_empty() {
+                done.push(node);
             }
+            next.extend(grown);
         }
         next.sort_by(|a, b| b.merit.total_cmp(&a.merit));
         next.dedup_by(|b, a| {
@@ -106,7 +106,8 @@ pub fn discover(
             break;
         }
     }
-    let best = front.into_iter().chain(best).max_by(|a, b| a.merit.total_cmp(&b.merit)).expect("the first node");
+    done.extend(front);
+    let best = best_whole(evidence, done, &cost, seed);
     Ok(Discovery { tree: best.tree, verdicts: best.verdicts, cost })
 }
 
@@ -134,13 +135,9 @@ fn grow(evidence: &mut Evidence, node: &Node, width: usize, cost: &Cost, seed: u
             // What it explains now, not what proposed it: refining may have found another piece.
             let verdicts = evidence.judge_some(&own, &node.open);
             let explained = node.open.iter().zip(&verdicts).filter(|(_, v)| v.explains());
-            let explained: Vec<Sample> = explained.map(|(&i, _)| evidence.samples[i]).collect();
-            let back: Vec<Motion> = poses[p.parent].iter().map(|p| p.inverse().into()).collect();
-            let stride = explained.len().div_ceil(CROWD).max(1);
-            let crowd: Vec<Sample> = explained.iter().step_by(stride).map(|s| s.moved(&back[s.state])).collect();
-            let joint = tree.joints.last().expect("a part was added");
-            let weight = plausibility(&joint.screw, &joint.values, joint.parent, &crowd, evidence.extent());
-            let merit = jury.gain(evidence, &own, true) * weight - cost;
+            let explained: Vec<usize> = explained.map(|(&i, _)| i).collect();
+            let merit =
+                jury.gain(evidence, &own, true) * worth(evidence, &tree, tree.parts.len() - 1, &explained) - cost;
             Final { merit, tree, explained: explained.len() }
         })
         .collect();
@@ -156,6 +153,39 @@ fn grow(evidence: &mut Evidence, node: &Node, width: usize, cost: &Cost, seed: u
             Node { tree: f.tree, verdicts, open, merit: node.merit + f.merit }
         })
         .collect()
+}
+
+/// How plausible the joint of a part is that explains these samples.
+fn worth(evidence: &Evidence, tree: &KinematicTree, part: usize, explained: &[usize]) -> f64 {
+    let joint = tree.joints.iter().find(|j| j.child == part).expect("every part but the base has a joint");
+    let parent = poses_of(tree, joint.parent, evidence.n_states());
+    let back: Vec<Motion> = parent.iter().map(|p| p.inverse().into()).collect();
+    let stride = explained.len().div_ceil(CROWD).max(1);
+    let some = explained.iter().step_by(stride).map(|&i| &evidence.samples[i]);
+    let crowd: Vec<Sample> = some.map(|s| s.moved(&back[s.state])).collect();
+    plausibility(&joint.screw, &joint.values, joint.parent, &crowd, evidence.extent())
+}
+
+/// Of finished sets of parts the best as a whole. Merits add up what each part removed when it was found, so they depend on the order:
+/// what a door explains by chance, a drawer found later can no longer.
+fn best_whole(evidence: &mut Evidence, done: Vec<Node>, cost: &Cost, seed: u64) -> Node {
+    let n_states = evidence.n_states();
+    let still = vec![Pose::IDENTITY; n_states];
+    evidence.mark_taken(&[still]);
+    let evidence = &*evidence;
+    let whole = |node: &Node| {
+        let (base, moving) = node.verdicts.split_at(1);
+        let open = open_samples(base);
+        let explained = |v: &[Verdict]| -> Vec<usize> { open.iter().copied().filter(|&i| v[i].explains()).collect() };
+        let part = |(k, v): (usize, &Vec<Verdict>)| {
+            (poses_of(&node.tree, k + 1, n_states), worth(evidence, &node.tree, k + 1, &explained(v)))
+        };
+        let parts: Vec<(Vec<Pose>, f64)> = moving.iter().enumerate().map(part).collect();
+        let jury = Jury::new(evidence, &open, base, seed);
+        jury.shared_gain(evidence, &parts) - parts.len() as f64 * cost.of(0.0)
+    };
+    let scored = done.into_iter().map(|node| (whole(&node), node));
+    scored.max_by(|a, b| a.0.total_cmp(&b.0)).expect("the first node").1
 }
 
 /// A proposal, refined.
