@@ -14,10 +14,11 @@ use glam::DVec3;
 use hingecast_geom::{KinematicTree, Pose};
 use nalgebra::{Matrix3, Vector3};
 
-/// Faces within this angle of the axis, or of square to it, radians, say where it points.
-const NEARLY: f64 = 0.15;
+/// Faces within this angle of the axis, or of square to it, radians, say where it points; first roughly, then without those that are
+/// curved or meant otherwise.
+const NEARLY: [f64; 2] = [0.15, 0.04];
 /// Faces do not know their directions better than this, radians.
-const KNOWN: f64 = 0.004;
+const KNOWN: f64 = 0.001;
 /// With many states an axis along the faces must explain the recording better by this many nats.
 const CLEARLY: f64 = 1.0;
 
@@ -56,19 +57,26 @@ pub fn straighten(evidence: &Evidence, tree: &mut KinematicTree, labels: &[u8], 
 /// once: the smallest eigenvector of the sum of n n' over the second minus that over the first. In the frame of the parent, whose poses
 /// are `parent`; none where the faces leave it open.
 fn along_faces(parent: &[Pose], own: &[(Sample, usize)], axis: DVec3) -> Option<DVec3> {
-    let mut spread = Matrix3::zeros();
-    for (s, _) in own {
-        let n = parent[s.state].inverse().rotate(s.normal.as_dvec3());
-        let (along, n) = (n.dot(axis).abs(), Vector3::new(n.x, n.y, n.z));
-        if along > NEARLY.cos() {
-            spread -= n * n.transpose();
-        } else if along < NEARLY.sin() {
-            spread += n * n.transpose();
+    let back: Vec<Pose> = parent.iter().map(Pose::inverse).collect();
+    let mut d = axis;
+    for nearly in NEARLY {
+        let mut spread = Matrix3::zeros();
+        for (s, _) in own {
+            let n = back[s.state].rotate(s.normal.as_dvec3());
+            let (along, n) = (n.dot(d).abs(), Vector3::new(n.x, n.y, n.z));
+            if along > nearly.cos() {
+                spread -= n * n.transpose();
+            } else if along < nearly.sin() {
+                spread += n * n.transpose();
+            }
+        }
+        let eigen = spread.symmetric_eigen();
+        let least = eigen.eigenvectors.column(eigen.eigenvalues.imin());
+        let least = DVec3::new(least[0], least[1], least[2]);
+        d = least * least.dot(axis).signum();
+        if d.dot(axis) < NEARLY[0].cos() {
+            return None;
         }
     }
-    let eigen = spread.symmetric_eigen();
-    let d = eigen.eigenvectors.column(eigen.eigenvalues.imin());
-    let d = DVec3::new(d[0], d[1], d[2]);
-    let d = d * d.dot(axis).signum();
-    (d.dot(axis) > NEARLY.cos()).then_some(d)
+    Some(d)
 }
