@@ -17,6 +17,8 @@ use nalgebra::{Matrix3, Vector3};
 /// Faces within this angle of the axis, or of square to it, radians, say where it points; first roughly, then without those that are
 /// curved or meant otherwise.
 const NEARLY: [f64; 2] = [0.15, 0.04];
+/// Share of a part's samples that must tell a direction from all others.
+const ENOUGH: f64 = 0.01;
 /// Faces do not know their directions better than this, radians.
 const KNOWN: f64 = 0.001;
 /// With many states an axis along the faces must explain the recording better by this many nats.
@@ -71,12 +73,41 @@ fn along_faces(parent: &[Pose], own: &[(Sample, usize)], axis: DVec3) -> Option<
             }
         }
         let eigen = spread.symmetric_eigen();
-        let least = eigen.eigenvectors.column(eigen.eigenvalues.imin());
+        let mut order = [0, 1, 2];
+        order.sort_by(|a, b| eigen.eigenvalues[*a].total_cmp(&eigen.eigenvalues[*b]));
+        let gap = eigen.eigenvalues[order[1]] - eigen.eigenvalues[order[0]];
+        let least = eigen.eigenvectors.column(order[0]);
         let least = DVec3::new(least[0], least[1], least[2]);
         d = least * least.dot(axis).signum();
-        if d.dot(axis) < NEARLY[0].cos() {
+        if gap < ENOUGH * own.len() as f64 || d.dot(axis) < NEARLY[0].cos() {
             return None;
         }
     }
     Some(d)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use glam::Vec3;
+
+    fn faces(normals: &[Vec3]) -> Vec<(Sample, usize)> {
+        normals.iter().map(|n| (Sample { state: 0, point: Vec3::ZERO, normal: n.normalize() }, 1)).collect()
+    }
+
+    #[test]
+    fn an_axis_goes_where_the_faces_say_and_nowhere_else() {
+        let still = [Pose::IDENTITY];
+        let askew = DVec3::new(0.08, -0.05, 1.0).normalize();
+        // Walls square to z, and one that leans by 6 deg and is forgotten the second time.
+        let walls = faces(&[Vec3::X, Vec3::Y, Vec3::X, Vec3::Y, Vec3::new(1.0, 0.0, 0.1)]);
+        let found = along_faces(&still, &walls, askew).expect("four walls know");
+        assert!(found.angle_between(DVec3::Z) < 1e-6, "{found}");
+        // One wall leaves a plane of directions open, none leaves all.
+        assert_eq!(along_faces(&still, &faces(&[Vec3::X; 5]), askew), None);
+        assert_eq!(along_faces(&still, &faces(&[Vec3::new(1.0, 1.0, 1.0); 5]), askew), None);
+        // A front alone does say where a slide goes.
+        let front = along_faces(&still, &faces(&[Vec3::Z; 5]), askew).expect("a front knows");
+        assert!(front.angle_between(DVec3::Z) < 1e-6, "{front}");
+    }
 }
