@@ -89,7 +89,7 @@ pub fn discover(
         progress.report(round, max_parts, &format!("{} parts", round + 1))?;
         let mut next: Vec<Node> = Vec::new();
         for node in front {
-            let grown = grow(evidence, &node, width, &cost, seed);
+            let grown = grow(evidence, &node, width, cost, seed);
             progress.check()?;
             if grown.is_empty() {
                 done.push(node);
@@ -107,12 +107,12 @@ pub fn discover(
         }
     }
     done.extend(front);
-    let best = best_whole(evidence, done, &cost, seed);
+    let best = best_whole(evidence, done, cost, seed);
     Ok(Discovery { tree: best.tree, verdicts: best.verdicts, cost })
 }
 
 /// The `width` best ways to add a part.
-fn grow(evidence: &mut Evidence, node: &Node, width: usize, cost: &Cost, seed: u64) -> Vec<Node> {
+fn grow(evidence: &mut Evidence, node: &Node, width: usize, cost: Cost, seed: u64) -> Vec<Node> {
     let cost = cost.of(node.open.iter().map(|&i| contradictions(&node.verdicts, i)).sum());
     let n_states = evidence.n_states();
     let least = ((LEAST_SHARE * evidence.samples.len() as f64) as usize).max(LEAST);
@@ -168,7 +168,10 @@ fn worth(evidence: &Evidence, tree: &KinematicTree, part: usize, explained: &[us
 
 /// Of finished sets of parts the best as a whole. Merits add up what each part removed when it was found, so they depend on the order:
 /// what a door explains by chance, a drawer found later can no longer.
-fn best_whole(evidence: &mut Evidence, done: Vec<Node>, cost: &Cost, seed: u64) -> Node {
+fn best_whole(evidence: &mut Evidence, mut done: Vec<Node>, cost: Cost, seed: u64) -> Node {
+    if done.len() == 1 {
+        return done.remove(0);
+    }
     let n_states = evidence.n_states();
     let still = vec![Pose::IDENTITY; n_states];
     evidence.mark_taken(&[still]);
