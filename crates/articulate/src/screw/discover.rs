@@ -34,7 +34,11 @@ impl Cost {
     /// `still`: the verdicts if nothing moved.
     fn new(still: &[Verdict], n_states: usize) -> Self {
         let all: f64 = still.iter().map(|v| v.against.count_ones() as f64).sum();
-        Self { part: PART_COST * all, chance: PART_COST_CHANCE / n_states as f64 }
+        let chance = PART_COST_CHANCE / n_states as f64;
+        if n_states < MANY_STATES {
+            return Self { part: (PART_COST + chance) * all, chance: 0.0 };
+        }
+        Self { part: PART_COST * all, chance }
     }
 
     /// Of a part where so many contradictions are left without it.
@@ -58,7 +62,8 @@ const BEAM: usize = 4;
 /// Share of all contradictions that a single rigid thing would have: a part's screw and its values have to be paid for by what they
 /// explain.
 const PART_COST: f64 = 0.015;
-/// With few states more is explained by chance; share of what is left, times the number of states.
+/// With few states more is explained by chance: share of what is left, times the number of states. Below [`MANY_STATES`] of all: there
+/// leftovers of parts that are right invite further ones (`three_drawers`).
 const PART_COST_CHANCE: f64 = 0.06;
 
 /// A set of parts under construction.
@@ -83,7 +88,7 @@ pub fn discover(
     let open = open_samples(&verdicts);
     let cost = Cost::new(&verdicts[0], n_states);
     let mut front = vec![Node { tree, verdicts, open, merit: 0.0 }];
-    let mut done: Vec<Node> = Vec::new();
+    let mut best: Option<Node> = None;
     let width = if n_states < MANY_STATES { BEAM } else { 1 };
     for round in 0..max_parts {
         progress.report(round, max_parts, &format!("{} parts", round + 1))?;
@@ -91,10 +96,10 @@ pub fn discover(
         for node in front {
             let grown = grow(evidence, &node, width, cost, seed);
             progress.check()?;
-            if grown.is_empty() {
-                done.push(node);
-            }
             next.extend(grown);
+            if best.as_ref().is_none_or(|b| node.merit > b.merit) {
+                best = Some(node);
+            }
         }
         next.sort_by(|a, b| b.merit.total_cmp(&a.merit));
         next.dedup_by(|b, a| {
@@ -106,8 +111,7 @@ pub fn discover(
             break;
         }
     }
-    done.extend(front);
-    let best = best_whole(evidence, done, cost, seed);
+    let best = front.into_iter().chain(best).max_by(|a, b| a.merit.total_cmp(&b.merit)).expect("the first node");
     Ok(Discovery { tree: best.tree, verdicts: best.verdicts, cost })
 }
 
@@ -135,9 +139,13 @@ fn grow(evidence: &mut Evidence, node: &Node, width: usize, cost: Cost, seed: u6
             // What it explains now, not what proposed it: refining may have found another piece.
             let verdicts = evidence.judge_some(&own, &node.open);
             let explained = node.open.iter().zip(&verdicts).filter(|(_, v)| v.explains());
-            let explained: Vec<usize> = explained.map(|(&i, _)| i).collect();
-            let merit =
-                jury.gain(evidence, &own, true) * worth(evidence, &tree, tree.parts.len() - 1, &explained) - cost;
+            let explained: Vec<Sample> = explained.map(|(&i, _)| evidence.samples[i]).collect();
+            let back: Vec<Motion> = poses[p.parent].iter().map(|p| p.inverse().into()).collect();
+            let stride = explained.len().div_ceil(CROWD).max(1);
+            let crowd: Vec<Sample> = explained.iter().step_by(stride).map(|s| s.moved(&back[s.state])).collect();
+            let joint = tree.joints.last().expect("a part was added");
+            let weight = plausibility(&joint.screw, &joint.values, joint.parent, &crowd, evidence.extent());
+            let merit = jury.gain(evidence, &own, true) * weight - cost;
             Final { merit, tree, explained: explained.len() }
         })
         .collect();
@@ -153,42 +161,6 @@ fn grow(evidence: &mut Evidence, node: &Node, width: usize, cost: Cost, seed: u6
             Node { tree: f.tree, verdicts, open, merit: node.merit + f.merit }
         })
         .collect()
-}
-
-/// How plausible the joint of a part is that explains these samples.
-fn worth(evidence: &Evidence, tree: &KinematicTree, part: usize, explained: &[usize]) -> f64 {
-    let joint = tree.joints.iter().find(|j| j.child == part).expect("every part but the base has a joint");
-    let parent = poses_of(tree, joint.parent, evidence.n_states());
-    let back: Vec<Motion> = parent.iter().map(|p| p.inverse().into()).collect();
-    let stride = explained.len().div_ceil(CROWD).max(1);
-    let some = explained.iter().step_by(stride).map(|&i| &evidence.samples[i]);
-    let crowd: Vec<Sample> = some.map(|s| s.moved(&back[s.state])).collect();
-    plausibility(&joint.screw, &joint.values, joint.parent, &crowd, evidence.extent())
-}
-
-/// Of finished sets of parts the best as a whole. Merits add up what each part removed when it was found, so they depend on the order:
-/// what a door explains by chance, a drawer found later can no longer.
-fn best_whole(evidence: &mut Evidence, mut done: Vec<Node>, cost: Cost, seed: u64) -> Node {
-    if done.len() == 1 {
-        return done.remove(0);
-    }
-    let n_states = evidence.n_states();
-    let still = vec![Pose::IDENTITY; n_states];
-    evidence.mark_taken(&[still]);
-    let evidence = &*evidence;
-    let whole = |node: &Node| {
-        let (base, moving) = node.verdicts.split_at(1);
-        let open = open_samples(base);
-        let explained = |v: &[Verdict]| -> Vec<usize> { open.iter().copied().filter(|&i| v[i].explains()).collect() };
-        let part = |(k, v): (usize, &Vec<Verdict>)| {
-            (poses_of(&node.tree, k + 1, n_states), worth(evidence, &node.tree, k + 1, &explained(v)))
-        };
-        let parts: Vec<(Vec<Pose>, f64)> = moving.iter().enumerate().map(part).collect();
-        let jury = Jury::new(evidence, &open, base, seed);
-        jury.shared_gain(evidence, &parts) - parts.len() as f64 * cost.of(0.0)
-    };
-    let scored = done.into_iter().map(|node| (whole(&node), node));
-    scored.max_by(|a, b| a.0.total_cmp(&b.0)).expect("the first node").1
 }
 
 /// A proposal, refined.

@@ -38,23 +38,6 @@ impl Jury {
     /// Contradictions that a part with these poses (world from canonical) removes. With `tight`, surface only counts
     /// whole where it is met within the noise, and is not explained already.
     pub fn gain(&self, evidence: &Evidence, poses: &[Pose], tight: bool) -> f64 {
-        // Summed in a fixed order.
-        self.gains(evidence, poses, tight).iter().sum::<f64>() * self.weight
-    }
-
-    /// Contradictions that several parts remove together, each member by the part that is best for it. `parts`: poses and what a
-    /// contradiction counts that this part removes.
-    pub fn shared_gain(&self, evidence: &Evidence, parts: &[(Vec<Pose>, f64)]) -> f64 {
-        let mut best = vec![0.0; self.members.len()];
-        for (poses, worth) in parts {
-            let gains = self.gains(evidence, poses, true);
-            best.iter_mut().zip(gains).for_each(|(b, g)| *b = f64::max(*b, g * worth));
-        }
-        best.iter().sum::<f64>() * self.weight
-    }
-
-    /// Per member.
-    fn gains(&self, evidence: &Evidence, poses: &[Pose], tight: bool) -> Vec<f64> {
         let between = evidence.between(poses);
         let each = |(s, fewest): &(Sample, f64)| {
             let v = evidence.ask_all(s, &between[s.state]);
@@ -71,7 +54,8 @@ impl Jury {
             }
             removed * share * (LOOSE + (1.0 - LOOSE) * closeness(evidence, s, &between[s.state], met))
         };
-        self.members.par_iter().map(each).collect()
+        // Summed in a fixed order.
+        self.members.par_iter().map(each).collect::<Vec<f64>>().iter().sum::<f64>() * self.weight
     }
 }
 
