@@ -254,6 +254,7 @@ fn crop_of(mask: &Pixels, w: usize, h: usize) -> Crop {
 /// the colour alone is not enough: a rim of gaussians with the background's colour costs nothing and makes silhouettes fat.
 const EDGE_SLACK: f32 = 0.5;
 
+/// Whether one of the eight pixels around is on the other side of the mask.
 fn on_edge(mask: &impl Fn(usize) -> f32, i: usize, w: usize, h: usize) -> bool {
     let (x, y) = (i % w, i / w);
     let own = mask(i) > 0.5;
