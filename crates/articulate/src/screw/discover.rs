@@ -5,11 +5,11 @@
 //! aligned (ICP), turned into a hinge and a slide, and asked in all states ([`super::scan`]). The finalists are refined by
 //! Gauss-Newton, and the one that removes the most contradictions, measured within the noise, becomes a part.
 
-use super::adopt::adopt;
 use super::evidence::{Evidence, Motion, Sample, Verdict, contradictions};
+use super::finals::{Final, Ground};
 use super::jury::Jury;
 use super::plausible::plausibility;
-use super::propose::{CROWD, MANY_STATES, Proposal, propose};
+use super::propose::{MANY_STATES, Proposal, propose};
 use hingecast_geom::{Cancelled, KinematicTree, Pose, Progress};
 use rayon::prelude::*;
 
@@ -67,11 +67,12 @@ const PART_COST: f64 = 0.015;
 const PART_COST_CHANCE: f64 = 0.06;
 
 /// A set of parts under construction.
-struct Node {
-    tree: KinematicTree,
-    verdicts: Vec<Vec<Verdict>>,
+pub struct Node {
+    pub tree: KinematicTree,
+    /// Per part, per sample.
+    pub verdicts: Vec<Vec<Verdict>>,
     /// Samples that every part contradicts.
-    open: Vec<usize>,
+    pub open: Vec<usize>,
     /// Contradictions removed so far, by tight count, times plausibility.
     merit: f64,
 }
@@ -130,29 +131,12 @@ fn grow(evidence: &mut Evidence, node: &Node, width: usize, cost: Cost, seed: u6
     let proposals: Vec<Proposal> = (0..node.tree.parts.len())
         .flat_map(|p| propose(evidence, p, &poses[p], &node.open, &node.verdicts, &jury, seed))
         .collect();
-    let mut finals: Vec<Final> = finalists(evidence, proposals)
-        .par_iter()
-        .map(|p| {
-            let mut tree = node.tree.clone();
-            adopt(evidence, &mut tree, p, &node.verdicts[p.parent], seed);
-            let own = poses_of(&tree, tree.parts.len() - 1, n_states);
-            // What it explains now, not what proposed it: refining may have found another piece.
-            let verdicts = evidence.judge_some(&own, &node.open);
-            let explained = node.open.iter().zip(&verdicts).filter(|(_, v)| v.explains());
-            let explained: Vec<Sample> = explained.map(|(&i, _)| evidence.samples[i]).collect();
-            let back: Vec<Motion> = poses[p.parent].iter().map(|p| p.inverse().into()).collect();
-            let stride = explained.len().div_ceil(CROWD).max(1);
-            let crowd: Vec<Sample> = explained.iter().step_by(stride).map(|s| s.moved(&back[s.state])).collect();
-            let joint = tree.joints.last().expect("a part was added");
-            let weight = plausibility(&joint.screw, &joint.values, joint.parent, &crowd, evidence.extent());
-            let merit = jury.gain(evidence, &own, true) * weight - cost;
-            Final { merit, tree, explained: explained.len() }
-        })
-        .collect();
+    let ground = Ground { evidence, node, poses: &poses, jury: &jury, cost, seed };
+    let mut finals: Vec<Final> = finalists(evidence, proposals).par_iter().map(|p| ground.best(p)).collect();
     finals.sort_by(|a, b| b.merit.total_cmp(&a.merit));
     finals
         .into_iter()
-        .filter(|f| f.explained >= least && f.merit > 0.0)
+        .filter(|f| f.explained.len() >= least && f.merit > 0.0)
         .take(width)
         .map(|f| {
             let mut verdicts = node.verdicts.clone();
@@ -161,14 +145,6 @@ fn grow(evidence: &mut Evidence, node: &Node, width: usize, cost: Cost, seed: u6
             Node { tree: f.tree, verdicts, open, merit: node.merit + f.merit }
         })
         .collect()
-}
-
-/// A proposal, refined.
-struct Final {
-    merit: f64,
-    tree: KinematicTree,
-    /// Open samples that it explains.
-    explained: usize,
 }
 
 /// World from canonical of a part in every state.

@@ -6,8 +6,9 @@
 //! evidence       all states together: what do they say if this sample moved so?
 //! hypotheses     screws from single correspondences        scan       one screw asked in all states
 //! propose        the best of these, aligned, per parent     adopt      a proposal refined into a part
+//! finals         the best proposals adopted, with their axes as found and along their faces
 //! discover       parts one after another, by what they explain (jury) and how usual they are (plausible)
-//! settle         states' frames, all joints together (refine)
+//! settle         states' frames, all joints together (refine, twist)
 //! straight       axes along their part's faces, where that explains as much
 //! labels         which part a sample belongs to
 //! steady         noisy recordings: every view aligned to what stands still, then settled again
@@ -20,6 +21,7 @@ pub mod cloud;
 pub mod discover;
 pub mod doubts;
 pub mod evidence;
+mod finals;
 mod hypotheses;
 mod jury;
 pub mod labels;
@@ -31,6 +33,7 @@ pub mod settle;
 pub mod space;
 mod steady;
 mod straight;
+mod twist;
 
 use cloud::DepthView;
 use evidence::Evidence;

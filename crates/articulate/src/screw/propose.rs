@@ -14,6 +14,8 @@ use rayon::prelude::*;
 
 /// Pairs of states per parent and round.
 const PAIRS: usize = 6;
+/// Two states show well what has moved if they show this part of the most that two states do.
+const WELL: usize = 4;
 /// Hypotheses per pair that are aligned.
 const ALIGNED: usize = 180;
 /// Samples that align and judge a hypothesis.
@@ -72,9 +74,7 @@ pub fn propose(
         let b = evidence.samples[i].state;
         (0..n).filter(|a| verdict[i].against >> a & 1 == 1).for_each(|a| counts[b * n + a] += 1);
     }
-    let mut pairs: Vec<usize> = (0..n * n).filter(|&k| counts[k] >= FEW).collect();
-    pairs.sort_by(|x, y| counts[*y].cmp(&counts[*x]).then(x.cmp(y)));
-    let pairs = varied(&pairs, n);
+    let pairs = varied(&counts, n);
     let back: Vec<Pose> = place.iter().map(Pose::inverse).collect();
     let mut all = Vec::new();
     for (k, &pair) in pairs.iter().enumerate() {
@@ -120,18 +120,39 @@ pub fn propose(
     all
 }
 
-/// The first pairs of a sorted list, at most two from one source state and two to one target.
-fn varied(pairs: &[usize], n: usize) -> Vec<usize> {
+/// Pairs of states that show motion, at most two from one source state and two to one target. `counts`: open samples of the first that
+/// the second contradicts. (n, n)
+///
+/// In turns the pair where most has moved, the pair where both states show most of what has moved (a closed drawer shows its front
+/// alone, and a front fits wherever there is another), and the pair where least has moved that both show well: with luck one part alone.
+fn varied(counts: &[usize], n: usize) -> Vec<usize> {
+    let back = |k: usize| counts[k % n * n + k / n];
+    let both = |k: usize| counts[k].min(back(k));
+    let most = (0..n * n).map(both).max().unwrap_or(0);
+    let ranked = |least: usize, by: &dyn Fn(usize) -> isize| {
+        let mut pairs: Vec<usize> = (0..n * n).filter(|&k| counts[k] >= FEW && WELL * both(k) >= least).collect();
+        pairs.sort_by_key(|k| (-by(*k), *k));
+        pairs.into_iter()
+    };
+    let mut lists = [
+        ranked(0, &|k| counts[k] as isize),
+        ranked(0, &|k| both(k) as isize),
+        ranked(most, &|k| -((counts[k] + back(k)) as isize)),
+    ];
     let (mut from, mut to) = (vec![0; n], vec![0; n]);
-    let mut out = Vec::new();
-    for &k in pairs {
-        if from[k / n] < 2 && to[k % n] < 2 {
-            from[k / n] += 1;
-            to[k % n] += 1;
-            out.push(k);
-            if out.len() == PAIRS {
-                break;
+    let mut out: Vec<usize> = Vec::new();
+    while out.len() < PAIRS {
+        let before = out.len();
+        for list in &mut lists {
+            let new = list.find(|k| !out.contains(k) && from[k / n] < 2 && to[k % n] < 2);
+            if let Some(k) = new.filter(|_| out.len() < PAIRS) {
+                from[k / n] += 1;
+                to[k % n] += 1;
+                out.push(k);
             }
+        }
+        if out.len() == before {
+            break;
         }
     }
     out

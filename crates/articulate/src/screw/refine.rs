@@ -3,48 +3,14 @@
 //! A sample of part k seen in state a is carried to state t by M = P_k(t) P_k(a)^-1 and compared with the plane measured
 //! there: r = n . (M x - y). Every joint on the way from k to the root moves it: a change of a parameter turns
 //! P_k(t) into exp(xi_t) P_k(t), with the twist xi in the world frame, so dr = n . (xi_t(M x) - R_M xi_a(x)).
-//!
-//! Twists of a joint in its parent's frame, with motion T = T(q), axis a through c, and b square to a:
-//! its value: the screw itself; its axis turned about b at c, or shifted along b: e - Ad_T e, since the new motion
-//! is exp(e) T exp(-e).
 
 use super::evidence::{Evidence, Motion, Sample};
+use super::twist::{Twist, square, twists};
 use glam::{DMat3, DVec3};
 use hingecast_geom::pose::quat_from_rotation_vector;
 use hingecast_geom::{JointKind, KinematicTree, Pose};
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
-
-/// Angular and linear velocity of a rigid motion about the world's origin.
-#[derive(Clone, Copy, Debug)]
-struct Twist {
-    w: DVec3,
-    v: DVec3,
-}
-
-impl Twist {
-    fn about(axis: DVec3, through: DVec3) -> Self {
-        Self { w: axis, v: through.cross(axis) }
-    }
-
-    fn shift(direction: DVec3) -> Self {
-        Self { w: DVec3::ZERO, v: direction }
-    }
-
-    /// The same twist seen from the frame that `pose` leads to.
-    fn moved(&self, pose: &Pose) -> Self {
-        let w = pose.rotate(self.w);
-        Self { w, v: pose.rotate(self.v) + pose.trans.cross(w) }
-    }
-
-    fn minus(&self, o: &Self) -> Self {
-        Self { w: self.w - o.w, v: self.v - o.v }
-    }
-
-    fn at(&self, x: DVec3) -> DVec3 {
-        self.v + self.w.cross(x)
-    }
-}
 
 #[derive(Clone, Copy, Debug)]
 pub struct Settings {
@@ -68,12 +34,6 @@ pub struct Report {
     pub sigmas: Vec<[f64; 3]>,
 }
 
-/// Directions square to `a`.
-fn square(a: DVec3) -> [DVec3; 2] {
-    let b = a.any_orthonormal_vector();
-    [b, a.cross(b)]
-}
-
 /// Where a joint's parameters stand in the unknowns: axis 2, pivot 2 (hinges), values from state 1 on.
 #[derive(Clone, Copy)]
 struct Slot {
@@ -89,8 +49,15 @@ struct Sums {
     /// Weighted mean of r^2.
     squares: f64,
     rows: usize,
+    /// r^2 / gate^2, 1 where no surface was found: the sum, later the mean.
     cost: f64,
     asked: usize,
+}
+
+impl Sums {
+    fn new(size: usize) -> Self {
+        Self { a: DMatrix::zeros(size, size), b: DVector::zeros(size), squares: 0.0, rows: 0, cost: 0.0, asked: 0 }
+    }
 }
 
 /// Improves the joints for which `free` says so, in place. `members`: samples and their parts.
@@ -118,90 +85,16 @@ pub fn refine(
         return report;
     }
     centre_pivots(tree, members);
-    let chains: Vec<Vec<usize>> = (0..tree.parts.len()).map(|p| tree.ancestry(p)).collect();
     for round in 0..settings.rounds {
         let share = round as f64 / (settings.rounds - 1).max(1) as f64;
         let gate = settings.gates[0] * (settings.gates[1] / settings.gates[0]).powf(share);
-        let poses: Vec<Vec<Pose>> = (0..n_states).map(|s| tree.poses_at(s)).collect();
-        let twists: Vec<Vec<Vec<Twist>>> =
-            (0..n_states).map(|s| (0..tree.joints.len()).map(|j| twists(tree, j, s, &poses[s])).collect()).collect();
-        let chunks: Vec<Sums> = members
-            .par_chunks(4096)
-            .enumerate()
-            .map(|(c, chunk)| {
-                let mut rng = fastrand::Rng::with_seed(seed ^ ((round as u64) << 32) ^ c as u64);
-                let (mut a, mut b) = (DMatrix::zeros(size, size), DVector::zeros(size));
-                let (mut sum, mut weight, mut rows) = (0.0, 0.0, 0);
-                let (mut cost, mut asked) = (0.0, 0);
-                let mut row: Vec<(usize, f64)> = Vec::new();
-                for (sample, part) in chunk {
-                    let back = poses[sample.state][*part].inverse();
-                    for _ in 0..settings.partners.min(n_states - 1) {
-                        let t = (sample.state + 1 + rng.usize(..n_states - 1)) % n_states;
-                        let m = poses[t][*part] * back;
-                        asked += 1;
-                        let Some((r, n, x)) = residual(evidence, sample, t, &m, gate) else {
-                            cost += 1.0;
-                            continue;
-                        };
-                        cost += (r / gate).powi(2);
-                        row.clear();
-                        let rotated = m.rot.conjugate() * n;
-                        for &j in &chains[*part] {
-                            let Some(slot) = slots[j] else { continue };
-                            let here = &twists[t][j];
-                            let there = &twists[sample.state][j];
-                            let d = |k: usize| n.dot(here[k].at(x)) - rotated.dot(there[k].at(sample.point.as_dvec3()));
-                            for k in 0..slot.n_shape {
-                                row.push((slot.shape + k, d(k)));
-                            }
-                            if t > 0 {
-                                row.push((slot.values + t - 1, n.dot(here[4].at(x))));
-                            }
-                            if sample.state > 0 {
-                                let g = rotated.dot(there[4].at(sample.point.as_dvec3()));
-                                row.push((slot.values + sample.state - 1, -g));
-                            }
-                        }
-                        // Geman and McClure: what lies far off hardly pulls.
-                        let w = (1.0 + (2.0 * r / gate).powi(2)).powi(-2);
-                        for &(i, gi) in &row {
-                            b[i] -= w * gi * r;
-                            for &(k, gk) in &row {
-                                a[(i, k)] += w * gi * gk;
-                            }
-                        }
-                        sum += w * r * r;
-                        weight += w;
-                        rows += 1;
-                    }
-                }
-                Sums { a, b, squares: sum / f64::max(weight, 1e-300), rows, cost, asked }
-            })
-            .collect();
-        let (mut a, mut b) = (DMatrix::zeros(size, size), DVector::zeros(size));
-        let (mut sum, mut rows, mut cost, mut asked) = (0.0, 0, 0.0, 0);
-        for chunk in chunks {
-            a += chunk.a;
-            b += chunk.b;
-            sum += chunk.squares * chunk.rows as f64;
-            rows += chunk.rows;
-            cost += chunk.cost;
-            asked += chunk.asked;
-        }
-        report.cost = cost / asked.max(1) as f64;
-        report.rms = (sum / rows.max(1) as f64).sqrt();
-        report.rows = rows;
-        // Unseen states keep their value; a joint that nothing constrains keeps its place.
-        let scale = a.diagonal().max().max(1e-12);
-        for i in 0..size {
-            a[(i, i)] += 1e-6 * a[(i, i)] + 1e-9 * scale;
-        }
-        let Some(solved) = a.cholesky() else { break };
-        let step = solved.solve(&b);
-        update(tree, &slots, &step);
+        let ask = Ask { evidence, members, slots: &slots, size, gate, partners: settings.partners, seed, round };
+        let sums = ask.all(tree);
+        report.cost = sums.cost;
+        report.rms = sums.squares.sqrt();
+        report.rows = sums.rows;
+        let Some(inverse) = step(&ask, tree, &sums) else { break };
         if round + 1 == settings.rounds {
-            let inverse = solved.inverse();
             let variance = report.rms * report.rms;
             for (j, slot) in slots.iter().enumerate() {
                 let Some(slot) = slot else { continue };
@@ -213,6 +106,152 @@ pub fn refine(
         }
     }
     report
+}
+
+/// One round's question: the same members meet the same states, however often it is asked.
+struct Ask<'a> {
+    evidence: &'a Evidence,
+    members: &'a [(Sample, usize)],
+    slots: &'a [Option<Slot>],
+    /// Unknowns.
+    size: usize,
+    gate: f64,
+    partners: usize,
+    seed: u64,
+    round: usize,
+}
+
+/// A step that moves no member by more than this share of the gate is taken unasked.
+const SMALL: f64 = 0.25;
+/// Members that tell how far a step moves them: every so many.
+const TELLING: usize = 29;
+/// Damping of the first try, shares of the diagonal; each further try takes the next one. The last resort is to stay.
+const DAMPING: [f64; 4] = [1e-6, 0.03, 1.0, 30.0];
+
+/// Takes the step that the sums ask for, shortened until what it promised is there. Answers the inverse of the normal matrix.
+///
+/// Few members of a drawer tell whether it rises on its way; a step away from them loses them all, and then nothing pulls it back.
+fn step(ask: &Ask, tree: &mut KinematicTree, sums: &Sums) -> Option<DMatrix<f64>> {
+    // Unseen states keep their value; a joint that nothing constrains keeps its place.
+    let scale = sums.a.diagonal().max().max(1e-12);
+    for damping in DAMPING {
+        let mut a = sums.a.clone();
+        for i in 0..ask.size {
+            a[(i, i)] += damping * a[(i, i)] + 1e-9 * scale;
+        }
+        let solved = a.cholesky()?;
+        let mut trial = tree.clone();
+        update(&mut trial, ask.slots, &solved.solve(&sums.b));
+        if ask.farthest(tree, &trial) < SMALL * ask.gate || ask.all(&trial).cost <= sums.cost {
+            *tree = trial;
+            return Some(solved.inverse());
+        }
+    }
+    None
+}
+
+impl Ask<'_> {
+    /// How far some members are apart under the two trees, where states are compared with the first; scene units.
+    fn farthest(&self, old: &KinematicTree, new: &KinematicTree) -> f64 {
+        let n_states = self.evidence.n_states();
+        let poses = |tree: &KinematicTree| -> Vec<Vec<Pose>> { (0..n_states).map(|s| tree.poses_at(s)).collect() };
+        let (old, new) = (poses(old), poses(new));
+        let gap = |(s, part): &(Sample, usize)| {
+            let x = s.point.as_dvec3();
+            let in_state =
+                |poses: &[Vec<Pose>], t: usize| poses[t][*part].apply(poses[s.state][*part].inverse().apply(x));
+            (0..n_states).map(|t| in_state(&old, t).distance(in_state(&new, t))).fold(0.0, f64::max)
+        };
+        self.members.iter().step_by(TELLING).map(gap).fold(0.0, f64::max)
+    }
+
+    /// Normal equations and cost of a tree.
+    fn all(&self, tree: &KinematicTree) -> Sums {
+        let n_states = self.evidence.n_states();
+        let chains: Vec<Vec<usize>> = (0..tree.parts.len()).map(|p| tree.ancestry(p)).collect();
+        let poses: Vec<Vec<Pose>> = (0..n_states).map(|s| tree.poses_at(s)).collect();
+        let twists: Vec<Vec<Vec<Twist>>> =
+            (0..n_states).map(|s| (0..tree.joints.len()).map(|j| twists(tree, j, s, &poses[s])).collect()).collect();
+        let chunks: Vec<Sums> = self
+            .members
+            .par_chunks(4096)
+            .enumerate()
+            .map(|(c, chunk)| self.some(chunk, c as u64, &chains, &poses, &twists))
+            .collect();
+        // Summed in a fixed order.
+        let mut all = Sums::new(self.size);
+        for chunk in chunks {
+            all.a += chunk.a;
+            all.b += chunk.b;
+            all.squares += chunk.squares * chunk.rows as f64;
+            all.rows += chunk.rows;
+            all.cost += chunk.cost;
+            all.asked += chunk.asked;
+        }
+        all.squares /= all.rows.max(1) as f64;
+        all.cost /= all.asked.max(1) as f64;
+        all
+    }
+
+    /// Those of one chunk; the cost is not divided yet.
+    fn some(
+        &self,
+        chunk: &[(Sample, usize)],
+        c: u64,
+        chains: &[Vec<usize>],
+        poses: &[Vec<Pose>],
+        twists: &[Vec<Vec<Twist>>],
+    ) -> Sums {
+        let (n_states, gate) = (self.evidence.n_states(), self.gate);
+        let mut rng = fastrand::Rng::with_seed(self.seed ^ ((self.round as u64) << 32) ^ c);
+        let mut out = Sums::new(self.size);
+        let mut weight = 0.0;
+        let mut row: Vec<(usize, f64)> = Vec::new();
+        for (sample, part) in chunk {
+            let back = poses[sample.state][*part].inverse();
+            for _ in 0..self.partners.min(n_states - 1) {
+                let t = (sample.state + 1 + rng.usize(..n_states - 1)) % n_states;
+                let m = poses[t][*part] * back;
+                out.asked += 1;
+                let Some((r, n, x)) = residual(self.evidence, sample, t, &m, gate) else {
+                    out.cost += 1.0;
+                    continue;
+                };
+                out.cost += (r / gate).powi(2);
+                row.clear();
+                let rotated = m.rot.conjugate() * n;
+                for &j in &chains[*part] {
+                    let Some(slot) = self.slots[j] else { continue };
+                    let here = &twists[t][j];
+                    let there = &twists[sample.state][j];
+                    let d = |k: usize| n.dot(here[k].at(x)) - rotated.dot(there[k].at(sample.point.as_dvec3()));
+                    for k in 0..slot.n_shape {
+                        row.push((slot.shape + k, d(k)));
+                    }
+                    if t > 0 {
+                        row.push((slot.values + t - 1, n.dot(here[4].at(x))));
+                    }
+                    if sample.state > 0 {
+                        let g = rotated.dot(there[4].at(sample.point.as_dvec3()));
+                        row.push((slot.values + sample.state - 1, -g));
+                    }
+                }
+                // Geman and McClure: what lies far off hardly pulls.
+                let w = (1.0 + (2.0 * r / gate).powi(2)).powi(-2);
+                for &(i, gi) in &row {
+                    out.b[i] -= w * gi * r;
+                    for &(k, gk) in &row {
+                        out.a[(i, k)] += w * gi * gk;
+                    }
+                }
+                out.squares += w * r * r;
+                weight += w;
+                out.rows += 1;
+            }
+        }
+        out.squares /= f64::max(weight, 1e-300);
+        out
+    }
 }
 
 /// Distance to the plane found at state t, its normal, and the carried point.
@@ -230,24 +269,6 @@ fn residual(evidence: &Evidence, s: &Sample, t: usize, m: &Pose, gate: f64) -> O
     let n = (n + normal).normalize().as_dvec3();
     let r = n.dot(x - cloud.points[i].as_dvec3());
     (r.abs() < gate).then_some((r, n, x))
-}
-
-/// World twists at state s of joint j: axis tilts 2, pivot shifts 2, value.
-fn twists(tree: &KinematicTree, j: usize, s: usize, poses: &[Pose]) -> Vec<Twist> {
-    let joint = &tree.joints[j];
-    let (axis, pivot) = (joint.screw.axis, joint.screw.pivot);
-    let motion = joint.screw.motion(joint.values[s]);
-    let parent = poses[joint.parent];
-    let world = |e: Twist| e.minus(&e.moved(&motion)).moved(&parent);
-    let [b1, b2] = square(axis);
-    let value = if joint.screw.kind.turns() { Twist::about(axis, pivot) } else { Twist::shift(axis) };
-    vec![
-        world(Twist::about(b1, pivot)),
-        world(Twist::about(b2, pivot)),
-        world(Twist::shift(b1)),
-        world(Twist::shift(b2)),
-        value.moved(&parent),
-    ]
 }
 
 fn update(tree: &mut KinematicTree, slots: &[Option<Slot>], step: &DVector<f64>) {

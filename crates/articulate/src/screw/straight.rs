@@ -35,7 +35,8 @@ pub fn straighten(evidence: &Evidence, tree: &mut KinematicTree, labels: &[u8], 
         let (child, screw) = (tree.joints[j].child, tree.joints[j].screw);
         let own = members(evidence, labels, child);
         let parent: Vec<Pose> = poses_of(tree, tree.joints[j].parent, evidence.n_states());
-        let Some(axis) = along_faces(&parent, &own, screw.axis).filter(|a| a.angle_between(screw.axis) > KNOWN) else {
+        let axis = along_faces(&parent, own.iter().map(|m| &m.0), screw.axis, &NEARLY);
+        let Some(axis) = axis.filter(|a| a.angle_between(screw.axis) > KNOWN) else {
             continue;
         };
         let free: Vec<bool> = (0..tree.joints.len()).map(|k| k == j).collect();
@@ -57,13 +58,18 @@ pub fn straighten(evidence: &Evidence, tree: &mut KinematicTree, labels: &[u8], 
 
 /// The direction that the faces nearly along `axis` and nearly square to it are along and square to, as well as they can be all at
 /// once: the smallest eigenvector of the sum of n n' over the second minus that over the first. In the frame of the parent, whose poses
-/// are `parent`; none where the faces leave it open.
-fn along_faces(parent: &[Pose], own: &[(Sample, usize)], axis: DVec3) -> Option<DVec3> {
+/// are `parent`; none where the faces leave it open. `nearly`: radians, from the first time to the last.
+pub fn along_faces<'a>(
+    parent: &[Pose],
+    own: impl ExactSizeIterator<Item = &'a Sample> + Clone,
+    axis: DVec3,
+    nearly: &[f64],
+) -> Option<DVec3> {
     let back: Vec<Pose> = parent.iter().map(Pose::inverse).collect();
-    let mut d = axis;
-    for nearly in NEARLY {
+    let (widest, mut d) = (nearly[0], axis);
+    for nearly in nearly {
         let mut spread = Matrix3::zeros();
-        for (s, _) in own {
+        for s in own.clone() {
             let n = back[s.state].rotate(s.normal.as_dvec3());
             let (along, n) = (n.dot(d).abs(), Vector3::new(n.x, n.y, n.z));
             if along > nearly.cos() {
@@ -79,7 +85,7 @@ fn along_faces(parent: &[Pose], own: &[(Sample, usize)], axis: DVec3) -> Option<
         let least = eigen.eigenvectors.column(order[0]);
         let least = DVec3::new(least[0], least[1], least[2]);
         d = least * least.dot(axis).signum();
-        if gap < ENOUGH * own.len() as f64 || d.dot(axis) < NEARLY[0].cos() {
+        if gap < ENOUGH * own.len() as f64 || d.dot(axis) < widest.cos() {
             return None;
         }
     }
@@ -91,8 +97,8 @@ mod tests {
     use super::*;
     use glam::Vec3;
 
-    fn faces(normals: &[Vec3]) -> Vec<(Sample, usize)> {
-        normals.iter().map(|n| (Sample { state: 0, point: Vec3::ZERO, normal: n.normalize() }, 1)).collect()
+    fn faces(normals: &[Vec3]) -> Vec<Sample> {
+        normals.iter().map(|n| Sample { state: 0, point: Vec3::ZERO, normal: n.normalize() }).collect()
     }
 
     #[test]
@@ -101,13 +107,13 @@ mod tests {
         let askew = DVec3::new(0.08, -0.05, 1.0).normalize();
         // Walls square to z, and one that leans by 6 deg and is forgotten the second time.
         let walls = faces(&[Vec3::X, Vec3::Y, Vec3::X, Vec3::Y, Vec3::new(1.0, 0.0, 0.1)]);
-        let found = along_faces(&still, &walls, askew).expect("four walls know");
+        let found = along_faces(&still, walls.iter(), askew, &NEARLY).expect("four walls know");
         assert!(found.angle_between(DVec3::Z) < 1e-6, "{found}");
         // One wall leaves a plane of directions open, none leaves all.
-        assert_eq!(along_faces(&still, &faces(&[Vec3::X; 5]), askew), None);
-        assert_eq!(along_faces(&still, &faces(&[Vec3::new(1.0, 1.0, 1.0); 5]), askew), None);
+        assert_eq!(along_faces(&still, faces(&[Vec3::X; 5]).iter(), askew, &NEARLY), None);
+        assert_eq!(along_faces(&still, faces(&[Vec3::new(1.0, 1.0, 1.0); 5]).iter(), askew, &NEARLY), None);
         // A front alone does say where a slide goes.
-        let front = along_faces(&still, &faces(&[Vec3::Z; 5]), askew).expect("a front knows");
+        let front = along_faces(&still, faces(&[Vec3::Z; 5]).iter(), askew, &NEARLY).expect("a front knows");
         assert!(front.angle_between(DVec3::Z) < 1e-6, "{front}");
     }
 }
