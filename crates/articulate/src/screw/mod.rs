@@ -8,6 +8,7 @@
 //! propose        the best of these, aligned, per parent     adopt      a proposal refined into a part
 //! finals         the best proposals adopted, with their axes as found and along their faces
 //! discover       parts one after another, by what they explain (jury) and how usual they are (plausible)
+//! chains         what hangs on what
 //! settle         states' frames, all joints together (refine, twist)
 //! straight       axes along their part's faces, where that explains as much
 //! labels         which part a sample belongs to
@@ -17,6 +18,7 @@
 
 mod adopt;
 pub mod cameras;
+mod chains;
 pub mod cloud;
 pub mod discover;
 pub mod doubts;

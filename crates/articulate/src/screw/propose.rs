@@ -131,7 +131,7 @@ fn varied(counts: &[usize], n: usize) -> Vec<usize> {
     let most = (0..n * n).map(both).max().unwrap_or(0);
     let ranked = |least: usize, by: &dyn Fn(usize) -> isize| {
         let mut pairs: Vec<usize> = (0..n * n).filter(|&k| counts[k] >= FEW && WELL * both(k) >= least).collect();
-        pairs.sort_by_key(|k| (-by(*k), *k));
+        pairs.sort_by_key(|k| (-by(*k), -(counts[*k] as isize), *k));
         pairs.into_iter()
     };
     let mut lists = [

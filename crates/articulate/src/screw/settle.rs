@@ -3,17 +3,16 @@
 
 use super::adopt::asked_again;
 use super::cameras::{mean_point, without_mean};
+use super::chains::{simplify, swap};
 use super::discover::{Cost, Discovery, poses_of};
 use super::doubts::{REFUTED, rival};
 use super::evidence::{Evidence, Motion, Sample, Verdict, contradictions};
-use super::hypotheses::nearest_screw;
 use super::labels::label;
 use super::refine::{Report, Settings, refine};
 use super::straight::straighten;
 use crate::icp::{self, Surface};
-use glam::{DVec3, Vec3};
-use hingecast_geom::pose::rotation_vector;
-use hingecast_geom::{JointKind, KinematicTree, Pose, Screw};
+use glam::Vec3;
+use hingecast_geom::{KinematicTree, Pose};
 use rayon::prelude::*;
 
 /// The final tree, and what it was found with.
@@ -49,6 +48,9 @@ pub fn settle(evidence: &mut Evidence, found: &Discovery, seed: u64) -> Settled 
     let mut verdicts = prune(evidence, &mut tree, found.cost);
     labels = label(evidence, &verdicts);
     slides(evidence, &mut tree, &labels, seed);
+    if swap(evidence, &mut tree, &mut verdicts) {
+        labels = label(evidence, &verdicts);
+    }
     let free = vec![true; tree.joints.len()];
     let noisy = evidence.is_noisy();
     let mut report = Report::default();
@@ -124,50 +126,8 @@ fn slides(evidence: &Evidence, tree: &mut KinematicTree, labels: &[u8], seed: u6
     }
 }
 
-/// Samples may be off by this many voxels when a part is hung on its grandparent.
-const ALIKE: f64 = 1.0;
-
-/// Hangs parts on their grandparents where one screw says as much there: of two drawers that slide alike, neither carries the other.
-fn simplify(evidence: &Evidence, tree: &mut KinematicTree, labels: &[u8]) {
-    let n_states = evidence.n_states();
-    for j in 0..tree.joints.len() {
-        while let Some(up) = tree.joints.iter().find(|up| up.child == tree.joints[j].parent).cloned() {
-            let joint = &tree.joints[j];
-            // Motion of the part in its grandparent's frame, and where its samples are in the canonical frame.
-            let motions: Vec<Pose> =
-                (0..n_states).map(|s| up.screw.motion(up.values[s]) * joint.screw.motion(joint.values[s])).collect();
-            let poses = poses_of(tree, joint.child, n_states);
-            let own = members(evidence, labels, joint.child);
-            let stride = own.len().div_ceil(ASKING).max(1);
-            let points: Vec<DVec3> =
-                own.iter().step_by(stride).map(|(s, _)| poses[s.state].inverse().apply(s.point.as_dvec3())).collect();
-            let tolerance = ALIKE * evidence.lattice.voxel as f64;
-            let Some((screw, values)) = one_screw(&motions, &points, joint.screw.kind, tolerance) else { break };
-            let joint = &mut tree.joints[j];
-            (joint.parent, joint.screw, joint.values) = (up.parent, screw, values);
-        }
-    }
-}
-
-/// The screw and values that move `points` as `motions` (the first is none) do, to within `tolerance`.
-fn one_screw(motions: &[Pose], points: &[DVec3], kind: JointKind, tolerance: f64) -> Option<(Screw, Vec<f64>)> {
-    let centre = points.iter().sum::<DVec3>() / points.len().max(1) as f64;
-    let size = |p: &Pose| p.angle() + (p.apply(centre) - centre).length();
-    let far = motions.iter().max_by(|a, b| size(a).total_cmp(&size(b)))?;
-    let (screw, _) = nearest_screw(far, kind, centre)?;
-    let value = |p: &Pose| {
-        if kind.turns() { rotation_vector(p.rot).dot(screw.axis) } else { (p.apply(centre) - centre).dot(screw.axis) }
-    };
-    let values: Vec<f64> = motions.iter().map(value).collect();
-    let alike = |(q, motion): (&f64, &Pose)| {
-        let moved = screw.motion(*q);
-        points.iter().all(|x| moved.apply(*x).distance(motion.apply(*x)) < tolerance)
-    };
-    values.iter().zip(motions).all(alike).then_some((screw, values))
-}
-
 /// Samples that ask for a value.
-const ASKING: usize = 500;
+pub const ASKING: usize = 500;
 
 /// Drops parts that the others make superfluous: those without children that explain less than they cost. Answers the
 /// verdicts of what is left.
@@ -253,27 +213,5 @@ fn tidy(tree: &mut KinematicTree) {
             joint.values.iter_mut().for_each(|v| *v = -*v);
         }
         joint.limits = joint.values.iter().fold([0.0f64; 2], |l, v| [l[0].min(*v), l[1].max(*v)]);
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn slides_along_one_line_are_one_slide_and_a_chain_of_hinges_is_none() {
-        let slide = Screw { kind: JointKind::Prismatic, axis: DVec3::X, pivot: DVec3::ZERO };
-        let hinge = |x: f64| Screw { kind: JointKind::Revolute, axis: DVec3::Z, pivot: DVec3::new(x, 0.0, 0.0) };
-        let values = [[0.0, 0.0], [0.3, 0.0], [0.3, 0.2], [0.1, 0.5]];
-        let points = [DVec3::new(1.0, 0.2, 0.0), DVec3::new(1.4, -0.2, 0.3), DVec3::new(1.2, 0.1, -0.2)];
-        let together = |up: Screw, own: Screw| -> Vec<Pose> {
-            values.iter().map(|v| up.motion(v[0]) * own.motion(v[1])).collect()
-        };
-        let (screw, sums) = one_screw(&together(slide, slide), &points, slide.kind, 1e-6).unwrap();
-        assert!(screw.axis.cross(DVec3::X).length() < 1e-9, "{screw:?}");
-        for (sum, v) in sums.iter().zip(values) {
-            assert!((sum * screw.axis.x - v[0] - v[1]).abs() < 1e-9, "{sums:?}");
-        }
-        assert!(one_screw(&together(hinge(0.0), hinge(1.0)), &points, JointKind::Revolute, 1e-3).is_none());
     }
 }
