@@ -187,6 +187,56 @@ fn a_joint_on_a_joint() {
     assert_eq!(found.tree.joints[head].parent, found.tree.joints[arm].child);
 }
 
+/// A turn and a slide along its axis commute: the seat does not know which comes first, the lever that only rises does.
+#[test]
+fn a_seat_that_rises_and_then_turns() {
+    let boxes = vec![
+        vec![cuboid([-0.4, -0.3, -0.3], [0.4, 0.3, -0.24]), cuboid([-0.06, -0.06, -0.24], [0.06, 0.06, 0.0])],
+        vec![cuboid([-0.04, -0.04, -0.2], [0.04, 0.04, 0.2]), cuboid([0.04, -0.05, 0.08], [0.35, 0.05, 0.16])],
+        vec![cuboid([-0.3, -0.2, 0.25], [0.3, 0.2, 0.33]), cuboid([-0.3, 0.2, 0.25], [0.3, 0.26, 0.7])],
+    ];
+    let tree = tree(vec![
+        joint(0, 1, JointKind::Prismatic, DVec3::Z, DVec3::ZERO, &[0.0, 0.0, 0.05, 0.12, 0.2]),
+        joint(1, 2, JointKind::Revolute, DVec3::Z, DVec3::ZERO, &[0.0, 0.6, 1.2, 1.7, 1.1]),
+    ]);
+    let found = find(&boxes, &tree);
+    assert_eq!(found.tree.parts.len(), 3, "{:?}", found.tree);
+    let (lift, seat) = (assert_found(&found, &tree.joints[0]), assert_found(&found, &tree.joints[1]));
+    assert_eq!(found.tree.joints[lift].parent, 0, "{:?}", found.tree);
+    assert_eq!(found.tree.joints[seat].parent, found.tree.joints[lift].child, "{:?}", found.tree);
+}
+
+/// Three equal drawers, opened one after another and left open: what disappears from one place appears where another was.
+#[test]
+fn equal_drawers_one_after_another() {
+    let mut boxes = vec![vec![
+        cuboid([-0.3, -0.4, -0.4], [0.4, -0.37, 0.8]),
+        cuboid([-0.3, 0.37, -0.4], [0.4, 0.4, 0.8]),
+        cuboid([0.37, -0.37, -0.4], [0.4, 0.37, 0.8]),
+    ]];
+    boxes[0].extend([-0.4, 0.0, 0.4, 0.77].map(|z| cuboid([-0.3, -0.37, z], [0.37, 0.37, z + 0.03])));
+    for z in [-0.37, 0.03, 0.43] {
+        boxes.push(vec![
+            cuboid([-0.34, -0.36, z + 0.01], [-0.3, 0.36, z + 0.35]),
+            cuboid([-0.3, -0.33, z + 0.03], [0.3, 0.33, z + 0.05]),
+            cuboid([-0.3, -0.33, z + 0.05], [0.3, -0.31, z + 0.25]),
+            cuboid([-0.3, 0.31, z + 0.05], [0.3, 0.33, z + 0.25]),
+        ]);
+    }
+    let ramp = |from: usize, far: f64| -> Vec<f64> {
+        (0..13).map(|s: usize| far * s.saturating_sub(from).min(4) as f64 / 4.0).collect()
+    };
+    let drawer = |k: usize| {
+        joint(0, k, JointKind::Prismatic, DVec3::NEG_X, DVec3::ZERO, &ramp(4 * (k - 1), [0.5, 0.45, 0.55][k - 1]))
+    };
+    let tree = tree((1..4).map(drawer).collect());
+    let found = find(&boxes, &tree);
+    assert_eq!(found.tree.parts.len(), 4, "{:?}", found.tree);
+    for truth in &tree.joints {
+        assert_found(&found, truth);
+    }
+}
+
 #[test]
 fn what_never_moves_is_one_part() {
     let tree = KinematicTree { parts: vec!["all".into()], joints: Vec::new() };

@@ -293,3 +293,25 @@ fn climb(start: Pose, samples: &[Sample], voxel: f64, agreement: &dyn Fn(Pose) -
 fn normals(samples: &[Sample]) -> Vec<glam::Vec3> {
     samples.iter().map(|s| s.normal).collect()
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn pairs_are_those_with_most_motion_and_those_with_one_part_alone() {
+        // Four states: a big part has left for good from state 1 on (100 samples); a small one moves between 2 and 3 (20).
+        let mut counts = vec![0; 16];
+        for t in 1..4 {
+            (counts[t], counts[4 * t]) = (100, 110);
+        }
+        (counts[2 * 4 + 3], counts[3 * 4 + 2]) = (27, 28);
+        let pairs = varied(&counts, 4);
+        assert_eq!(pairs.len(), PAIRS, "{pairs:?}");
+        assert!(pairs.contains(&4), "most has moved: {pairs:?}");
+        assert!(pairs.contains(&14) && pairs.contains(&11), "least has moved: {pairs:?}");
+        assert!(pairs.iter().all(|k| counts[*k] >= FEW), "{pairs:?}");
+        // No pair shows anything.
+        assert!(varied(&[0; 16], 4).is_empty());
+    }
+}

@@ -49,6 +49,8 @@ pub fn settle(evidence: &mut Evidence, found: &Discovery, seed: u64) -> Settled 
     labels = label(evidence, &verdicts);
     slides(evidence, &mut tree, &labels, seed);
     if swap(evidence, &mut tree, &mut verdicts) {
+        // What was a part of its own because the chain was the wrong way round.
+        verdicts = prune(evidence, &mut tree, found.cost);
         labels = label(evidence, &verdicts);
     }
     let free = vec![true; tree.joints.len()];
