@@ -29,7 +29,7 @@ pub struct Cli {
     /// Machine-readable answer on stdout; everything human stays on stderr.
     #[arg(long, global = true)]
     pub json: bool,
-    /// No progress on stderr.
+    /// Nothing on stderr but errors, not even the answer: that comes with --json.
     #[arg(long, short, global = true)]
     pub quiet: bool,
     /// Worker threads, 1 or more [default: all cores]. The results do not depend on it.

@@ -9,7 +9,7 @@ use hingecast_geom::pose::rotation_vector;
 use hingecast_geom::{JointKind, KinematicTree, Pose, Screw};
 
 /// Axes that point the same way to within this angle, radians.
-const PARALLEL: f64 = 0.02;
+const PARALLEL: f64 = 0.05;
 
 /// What a state that shows a sample where it should be is worth, contradictions.
 const SHOWN: f64 = 0.1;

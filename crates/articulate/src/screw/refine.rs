@@ -9,7 +9,7 @@ use super::twist::{Twist, square, twists};
 use glam::{DMat3, DVec3};
 use hingecast_geom::pose::quat_from_rotation_vector;
 use hingecast_geom::{JointKind, KinematicTree, Pose};
-use nalgebra::{DMatrix, DVector};
+use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
 use rayon::prelude::*;
 
 #[derive(Clone, Copy, Debug)]
@@ -93,8 +93,9 @@ pub fn refine(
         report.cost = sums.cost;
         report.rms = sums.squares.sqrt();
         report.rows = sums.rows;
-        let Some(inverse) = step(&ask, tree, &sums) else { break };
+        let Some(solved) = step(&ask, tree, &sums) else { break };
         if round + 1 == settings.rounds {
+            let inverse = solved.inverse();
             let variance = report.rms * report.rms;
             for (j, slot) in slots.iter().enumerate() {
                 let Some(slot) = slot else { continue };
@@ -128,26 +129,28 @@ const TELLING: usize = 29;
 /// Damping of the first try, shares of the diagonal; each further try takes the next one. The last resort is to stay.
 const DAMPING: [f64; 4] = [1e-6, 0.03, 1.0, 30.0];
 
-/// Takes the step that the sums ask for, shortened until what it promised is there. Answers the inverse of the normal matrix.
+/// Takes the step that the sums ask for, shortened until it keeps what it promises, or none. Answers the normal matrix, decomposed.
 ///
 /// Few members of a drawer tell whether it rises on its way; a step away from them loses them all, and then nothing pulls it back.
-fn step(ask: &Ask, tree: &mut KinematicTree, sums: &Sums) -> Option<DMatrix<f64>> {
+fn step(ask: &Ask, tree: &mut KinematicTree, sums: &Sums) -> Option<Cholesky<f64, Dyn>> {
     // Unseen states keep their value; a joint that nothing constrains keeps its place.
     let scale = sums.a.diagonal().max().max(1e-12);
-    for damping in DAMPING {
+    let damped = |damping: f64| {
         let mut a = sums.a.clone();
         for i in 0..ask.size {
             a[(i, i)] += damping * a[(i, i)] + 1e-9 * scale;
         }
-        let solved = a.cholesky()?;
+        a.cholesky()
+    };
+    for damping in DAMPING {
         let mut trial = tree.clone();
-        update(&mut trial, ask.slots, &solved.solve(&sums.b));
+        update(&mut trial, ask.slots, &damped(damping)?.solve(&sums.b));
         if ask.farthest(tree, &trial) < SMALL * ask.gate || ask.all(&trial).cost <= sums.cost {
             *tree = trial;
-            return Some(solved.inverse());
+            break;
         }
     }
-    None
+    damped(DAMPING[0])
 }
 
 impl Ask<'_> {
