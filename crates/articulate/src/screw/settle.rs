@@ -46,13 +46,12 @@ pub fn settle(evidence: &mut Evidence, found: &Discovery, seed: u64) -> Settled 
     let mut labels = label(evidence, &found.verdicts);
     ask_again(evidence, &mut tree, &labels, seed);
     let mut verdicts = prune(evidence, &mut tree, found.cost);
-    labels = label(evidence, &verdicts);
-    slides(evidence, &mut tree, &labels, seed);
     if swap(evidence, &mut tree, &mut verdicts) {
         // What was a part of its own because the chain was the wrong way round.
         verdicts = prune(evidence, &mut tree, found.cost);
-        labels = label(evidence, &verdicts);
     }
+    labels = label(evidence, &verdicts);
+    slides(evidence, &mut tree, &labels, seed);
     let free = vec![true; tree.joints.len()];
     let noisy = evidence.is_noisy();
     let mut report = Report::default();
