@@ -142,15 +142,17 @@ fn step(ask: &Ask, tree: &mut KinematicTree, sums: &Sums) -> Option<Cholesky<f64
         }
         a.cholesky()
     };
-    for damping in DAMPING {
+    let first = damped(DAMPING[0])?;
+    for (k, damping) in DAMPING.into_iter().enumerate() {
+        let by = if k == 0 { first.solve(&sums.b) } else { damped(damping)?.solve(&sums.b) };
         let mut trial = tree.clone();
-        update(&mut trial, ask.slots, &damped(damping)?.solve(&sums.b));
+        update(&mut trial, ask.slots, &by);
         if ask.farthest(tree, &trial) < SMALL * ask.gate || ask.all(&trial).cost <= sums.cost {
             *tree = trial;
             break;
         }
     }
-    damped(DAMPING[0])
+    Some(first)
 }
 
 impl Ask<'_> {
