@@ -109,6 +109,20 @@ pub fn refine(
     report
 }
 
+/// Mean over all comparisons of r^2 / gate^2, 1 where no surface was found, as a first round of [`refine`] with this gate would report
+/// it.
+pub fn cost(
+    evidence: &Evidence,
+    tree: &KinematicTree,
+    members: &[(Sample, usize)],
+    gate: f64,
+    partners: usize,
+    seed: u64,
+) -> f64 {
+    let slots = vec![None; tree.joints.len()];
+    Ask { evidence, members, slots: &slots, size: 0, gate, partners, seed, round: 0 }.all(tree).cost
+}
+
 /// One round's question: the same members meet the same states, however often it is asked.
 struct Ask<'a> {
     evidence: &'a Evidence,

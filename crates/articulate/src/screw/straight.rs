@@ -8,7 +8,7 @@ use super::discover::poses_of;
 use super::doubts::{behind, two_unknowns};
 use super::evidence::{Evidence, Sample};
 use super::propose::MANY_STATES;
-use super::refine::{Settings, refine};
+use super::refine::{Settings, cost, refine};
 use super::settle::members;
 use glam::DVec3;
 use hingecast_geom::{KinematicTree, Pose};
@@ -28,8 +28,6 @@ const CLEARLY: f64 = 1.0;
 /// two unknowns less are worth their share of evidence.
 pub fn straighten(evidence: &Evidence, tree: &mut KinematicTree, labels: &[u8], seed: u64) {
     let voxel = evidence.lattice.voxel as f64;
-    // One round answers the cost of what it is given.
-    let ask = Settings { gates: [0.6 * voxel; 2], rounds: 1, partners: 6 };
     let fit = Settings { gates: [1.0 * voxel, 0.6 * voxel], rounds: 4, partners: 6 };
     for j in 0..tree.joints.len() {
         let (child, screw) = (tree.joints[j].child, tree.joints[j].screw);
@@ -40,7 +38,7 @@ pub fn straighten(evidence: &Evidence, tree: &mut KinematicTree, labels: &[u8], 
             continue;
         };
         let free: Vec<bool> = (0..tree.joints.len()).map(|k| k == j).collect();
-        let cost = |tree: &KinematicTree| refine(evidence, &mut tree.clone(), &own, &free, &ask, seed).cost;
+        let cost = |tree: &KinematicTree| cost(evidence, tree, &own, 0.6 * voxel, 6, seed);
         let mut straight = tree.clone();
         straight.joints[j].screw.axis = axis;
         if screw.kind.turns() {
