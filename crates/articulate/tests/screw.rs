@@ -206,6 +206,33 @@ fn a_seat_that_rises_and_then_turns() {
     assert_eq!(found.tree.joints[seat].parent, found.tree.joints[lift].child, "{:?}", found.tree);
 }
 
+/// A blade lies on another, half a voxel higher: the grid alone gives the rim of the one to the other.
+#[test]
+fn blades_a_fraction_of_a_voxel_apart() {
+    let tops = [0.06, 0.072];
+    let boxes = vec![
+        vec![cuboid([-0.9, -0.12, 0.0], [0.9, 0.12, tops[0]])],
+        vec![cuboid([-0.5, -0.12, tops[0]], [0.9, 0.12, tops[1]]), cuboid([0.6, -0.1, tops[1]], [0.8, 0.1, 0.3])],
+    ];
+    let values = [0.05, 0.15, 0.3, 0.45, 0.6, 0.75];
+    let tree = tree(vec![joint(0, 1, JointKind::Revolute, DVec3::Z, DVec3::ZERO, &values)]);
+    let found = find(&boxes, &tree);
+    assert_eq!(found.tree.parts.len(), 2, "{:?}", found.tree);
+    assert_found(&found, &tree.joints[0]);
+    let (mut wrong, mut all) = (0, 0);
+    for s in &found.samples {
+        // Around the pivot both turn in their own plane. A sample of a voxel that holds both rims lies between the tops.
+        if s.point.truncate().length() < 0.17 {
+            continue;
+        }
+        if let Some(part) = tops.iter().position(|top| (s.point.z - *top as f32).abs() < 1e-3) {
+            all += 1;
+            wrong += usize::from(s.part as usize != part);
+        }
+    }
+    assert!(all > 3000 && wrong * 33 < all, "{wrong} of {all}");
+}
+
 /// Three equal drawers, opened one after another and left open: what disappears from one place appears where another was.
 #[test]
 fn equal_drawers_one_after_another() {

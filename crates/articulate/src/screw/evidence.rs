@@ -163,24 +163,38 @@ impl Evidence {
                 if t == s.state {
                     return None;
                 }
-                self.plane_distance(t, s.point, s.normal)
+                Some(self.height(t, s.point, s.normal)?.abs())
             })
             .collect();
         deviation(&mut off)
     }
 
-    /// Distance from the plane of state t's sample nearest to `x`, if it lies within a voxel and faces the same way.
-    fn plane_distance(&self, t: usize, x: Vec3, n: Vec3) -> Option<f32> {
+    /// Height of `x` above the plane of state t's sample nearest to it, if that lies within a voxel and faces the same way.
+    fn height(&self, t: usize, x: Vec3, n: Vec3) -> Option<f32> {
         let cloud = &self.clouds[t];
         let (i, squared) = cloud.nearest(x)?;
         let reach = 1.1 * self.lattice.voxel;
         let m = cloud.normals[i];
-        (squared < reach * reach && m.dot(n) > 0.85).then(|| m.dot(x - cloud.points[i]).abs())
+        (squared < reach * reach && m.dot(n) > 0.85).then(|| m.dot(x - cloud.points[i]))
     }
 
     /// Whether state t measured a surface at `x` that faces along `n`, within the noise.
     pub fn meets(&self, t: usize, x: Vec3, n: Vec3) -> bool {
-        self.plane_distance(t, x, n).is_some_and(|d| d < self.tolerance)
+        self.height(t, x, n).is_some_and(|d| d.abs() < self.tolerance)
+    }
+
+    /// `raw` with an eye for less than the grid resolves: above the surface that counts as support a sample would have been seen, and below
+    /// it nobody saw it.
+    pub fn sharpened(&self, raw: Verdict, s: &Sample, from: &[Motion]) -> Verdict {
+        let mut v = raw;
+        for (t, m) in from.iter().enumerate().filter(|(t, _)| raw.support >> t & 1 == 1) {
+            let Some(height) = self.height(t, m.apply(s.point), m.rot * s.normal) else { continue };
+            if height.abs() > self.tolerance {
+                v.support &= !(1 << t);
+                v.against |= u64::from(height > 0.0) << t;
+            }
+        }
+        v
     }
 
     /// World at state `t` from world at state `a`, for something that moves with `poses` (world from canonical). [a][t]

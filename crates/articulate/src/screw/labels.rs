@@ -23,6 +23,8 @@ const NEAR: usize = 8;
 const CREASE: f32 = 0.15;
 /// Share of its own cost that a sample keeps in a round of smoothing.
 const OWN: f32 = 0.3;
+/// Most that a neighbour's dislike of a part counts where depth is sharp, in states that would show it.
+const HEARD: f32 = 4.0;
 
 /// What it costs to give a sample to a part with this verdict.
 fn cost(v: &Verdict) -> f32 {
@@ -58,18 +60,32 @@ pub fn label(evidence: &Evidence, verdicts: &[Vec<Verdict>]) -> Vec<u8> {
 pub fn label_clouds(evidence: &Evidence, tree: &KinematicTree) -> Vec<Vec<u8>> {
     let (n_states, n_parts) = (evidence.n_states(), tree.parts.len());
     let between: Vec<_> = (0..n_parts).map(|p| evidence.between(&poses_of(tree, p, n_states))).collect();
+    // Poses that are off by a fraction of a voxel look like such steps.
+    let sharp = !evidence.is_noisy();
+    let heard = if sharp { HEARD } else { f32::INFINITY };
     let verdicts: Vec<Vec<Verdict>> = (0..n_states)
         .map(|state| {
             let cloud = &evidence.clouds[state];
-            let ask = |k: usize| evidence.ask_all(&Sample::of(cloud, state, k / n_parts), &between[k % n_parts][state]);
-            (0..cloud.points.len() * n_parts).into_par_iter().map(ask).collect()
+            let ask = |i: usize| {
+                let sample = Sample::of(cloud, state, i);
+                let mut own: Vec<Verdict> =
+                    (0..n_parts).map(|p| evidence.ask_all(&sample, &between[p][state])).collect();
+                // Where more than one part could own it, the grid alone does not tell.
+                if sharp && own.iter().filter(|v| cost(v) < 0.0).count() > 1 {
+                    for (v, between) in own.iter_mut().zip(&between).filter(|(v, _)| cost(v) < 0.0) {
+                        *v = evidence.sharpened(*v, &sample, &between[state]);
+                    }
+                }
+                own
+            };
+            (0..cloud.points.len()).into_par_iter().flat_map_iter(ask).collect()
         })
         .collect();
     let near: Vec<Vec<Near>> = evidence.clouds.iter().map(neighbours).collect();
     // Before anybody believes anything, all support counts.
     let mut costs: Vec<Vec<f32>> = verdicts.iter().map(|state| state.iter().map(cost).collect()).collect();
     for _ in 0..TURNS {
-        let smoothed = costs.iter().zip(&near).map(|(c, near)| smooth(c, near, n_parts));
+        let smoothed = costs.iter().zip(&near).map(|(c, near)| smooth(c, near, n_parts, heard));
         let beliefs: Vec<Beliefs> = smoothed
             .zip(&evidence.clouds)
             .map(|(c, cloud)| Beliefs::new(&evidence.lattice, cloud, &c, n_parts))
@@ -84,7 +100,7 @@ pub fn label_clouds(evidence: &Evidence, tree: &KinematicTree) -> Vec<Vec<u8>> {
         }
     }
     let plain = |state: usize| -> Vec<u8> {
-        let smoothed = smooth(&costs[state], &near[state], n_parts);
+        let smoothed = smooth(&costs[state], &near[state], n_parts, heard);
         smoothed.chunks_exact(n_parts).map(|c| cheapest(n_parts, |p| c[p])).collect()
     };
     let plain: Vec<Vec<u8>> = (0..n_states).into_par_iter().map(plain).collect();
@@ -193,13 +209,20 @@ fn neighbours(cloud: &Surface) -> Vec<Near> {
     (0..cloud.points.len()).into_par_iter().map(of).collect()
 }
 
-/// Costs [point][part], smoothed.
-fn smooth(costs: &[f32], near: &[Near], n_parts: usize) -> Vec<f32> {
+/// Costs [point][part], smoothed. What a neighbour says against a part counts up to `most`: a rim two samples wide is not its neighbours'.
+fn smooth(costs: &[f32], near: &[Near], n_parts: usize, most: f32) -> Vec<f32> {
     let mut costs = costs.to_vec();
     for _ in 0..SMOOTHING {
+        let heard: Vec<f32> = costs
+            .chunks_exact(n_parts)
+            .flat_map(|c| {
+                let least = c.iter().copied().fold(f32::INFINITY, f32::min);
+                c.iter().map(move |c| (c - least).min(most))
+            })
+            .collect();
         let mean = |k: usize| {
             let (i, p) = (k / n_parts, k % n_parts);
-            let sum: f32 = near[i].iter().map(|(j, w)| w * costs[*j as usize * n_parts + p]).sum();
+            let sum: f32 = near[i].iter().map(|(j, w)| w * heard[*j as usize * n_parts + p]).sum();
             OWN * costs[k] + (1.0 - OWN) * sum
         };
         costs = (0..costs.len()).into_par_iter().map(mean).collect();
