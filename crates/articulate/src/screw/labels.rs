@@ -23,7 +23,7 @@ const NEAR: usize = 8;
 const CREASE: f32 = 0.15;
 /// Share of its own cost that a sample keeps in a round of smoothing.
 const OWN: f32 = 0.3;
-/// Most that a neighbour's dislike of a part counts where depth is sharp, in states that would show it.
+/// Most that a neighbour speaks against a part where depth is sharp (a contradiction costs 2, a confirmation -1).
 const HEARD: f32 = 4.0;
 
 /// What it costs to give a sample to a part with this verdict.
