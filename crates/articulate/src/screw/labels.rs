@@ -217,7 +217,7 @@ fn smooth(costs: &[f32], near: &[Near], n_parts: usize, most: f32) -> Vec<f32> {
             .chunks_exact(n_parts)
             .flat_map(|c| {
                 let least = c.iter().copied().fold(f32::INFINITY, f32::min);
-                c.iter().map(move |c| (c - least).min(most))
+                c.iter().map(move |c| c.min(least + most))
             })
             .collect();
         let mean = |k: usize| {
