@@ -10,7 +10,7 @@ use serde::{Deserialize, Serialize};
 use std::path::{Path, PathBuf};
 
 /// Grows when the meaning of files in a run changes.
-const FORMAT: u32 = 5;
+const FORMAT: u32 = 6;
 
 /// Name, time and memory of one finished stage.
 #[derive(Clone, Debug, Serialize, Deserialize)]
@@ -83,6 +83,11 @@ impl RunFolder {
     /// Whether `stage` is done with this stamp.
     pub fn is_done(&self, stage: &str, stamp: &str) -> bool {
         self.record.stages.iter().any(|s| s.name == stage && s.stamp == stamp) && self.folder(stage).is_dir()
+    }
+
+    /// Whether `stage` is done, with whatever stamp.
+    pub fn has(&self, stage: &str) -> bool {
+        self.record.stages.iter().any(|s| s.name == stage)
     }
 
     /// Empties the stage's folder unless it holds a checkpoint of the same stamp; drops it and all later ones

@@ -10,7 +10,7 @@ use hingecast_geom::{Certainty, Joint, JointKind, KinematicTree};
 use std::collections::HashMap;
 
 /// Samples count as independent evidence in groups of this size: neighbours share their noise.
-const CORRELATED: f64 = 25.0;
+pub const CORRELATED: f64 = 25.0;
 /// Log-likelihood ratio (nats) below which a rival is not refuted.
 pub const REFUTED: f64 = 10.0;
 /// Standard deviations worth mentioning: axis [deg], pivot [share of the object's extent].

@@ -13,6 +13,8 @@
 //! straight       axes along their part's faces, where that explains as much
 //! labels         which part a sample belongs to
 //! steady         noisy recordings: every view aligned to what stands still, then settled again
+//! information    how sharply the depth holds the pose of every part
+//! photometric    noisy recordings: joints and frames by pictures and depth together (pictures: gradients through the gaussians)
 //! doubts         rivals, covariance, what was hardly seen
 //! ```
 
@@ -25,8 +27,11 @@ pub mod doubts;
 pub mod evidence;
 mod finals;
 mod hypotheses;
+mod information;
 mod jury;
 pub mod labels;
+pub mod photometric;
+mod pictures;
 mod plausible;
 mod propose;
 pub mod refine;
@@ -41,6 +46,7 @@ use cloud::DepthView;
 use evidence::Evidence;
 use glam::Vec3;
 use hingecast_geom::{Cancelled, Certainty, KinematicTree, Pose, Progress};
+pub use information::Information;
 use serde::{Deserialize, Serialize};
 
 #[derive(Clone, Debug, Serialize, Deserialize)]
@@ -79,6 +85,9 @@ pub struct Found {
     /// Per state and view: camera_from_world as corrected.
     pub cameras: Vec<Vec<Pose>>,
     pub report: refine::Report,
+    /// What the depth says about the pose of every part (see [`photometric`]); empty where depth is so sharp that pictures have nothing
+    /// to add. [state][part]
+    pub information: Vec<Vec<Information>>,
     /// Of each joint, in the tree's order.
     pub certainty: Vec<Certainty>,
     pub doubts: Vec<String>,
@@ -126,7 +135,8 @@ pub fn run<E: From<Cancelled>>(
     let mut settled = settle::settle(&mut evidence, &discovery, seed);
     apply(&settled.rig, &mut cameras);
     let mut labels = labels::label_clouds(&evidence, &settled.tree);
-    if config.align_cameras && evidence.is_noisy() {
+    let noisy = evidence.is_noisy();
+    if config.align_cameras && noisy {
         let base = steady::base(&evidence, &labels);
         let before = evidence;
         evidence = Evidence::gather::<E>(
@@ -150,6 +160,7 @@ pub fn run<E: From<Cancelled>>(
         apply(&settled.rig, &mut cameras);
         labels = labels::label_clouds(&evidence, &settled.tree);
     }
+    let information = if noisy { information::of_parts(&evidence, &labels, &settled) } else { Vec::new() };
     let (doubts, certainty) = doubts::doubts(&evidence, &settled, &labels, seed);
     let of_state = |(state, own): (usize, &Vec<u8>)| -> Vec<Labelled> {
         let points = &evidence.clouds[state].points;
@@ -161,6 +172,7 @@ pub fn run<E: From<Cancelled>>(
         tree: settled.tree,
         cameras,
         report: settled.report,
+        information,
         certainty,
         doubts,
     })

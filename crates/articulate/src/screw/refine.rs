@@ -36,10 +36,25 @@ pub struct Report {
 
 /// Where a joint's parameters stand in the unknowns: axis 2, pivot 2 (hinges), values from state 1 on.
 #[derive(Clone, Copy)]
-struct Slot {
-    shape: usize,
-    n_shape: usize,
-    values: usize,
+pub struct Slot {
+    pub shape: usize,
+    pub n_shape: usize,
+    pub values: usize,
+}
+
+/// Slots of the joints that are free, and the number of unknowns.
+pub fn slots(tree: &KinematicTree, free: &[bool], n_states: usize) -> (Vec<Option<Slot>>, usize) {
+    let mut size = 0;
+    let mut slot = |n_shape: usize| {
+        let slot = Slot { shape: size, n_shape, values: size + n_shape };
+        size += n_shape + n_states - 1;
+        slot
+    };
+    let joints = tree.joints.iter().zip(free);
+    let slots = joints.map(|(joint, free)| {
+        (*free && joint.screw.kind != JointKind::Fixed).then(|| slot(if joint.screw.kind.turns() { 4 } else { 2 }))
+    });
+    (slots.collect(), size)
 }
 
 /// Normal equations and tallies of some members.
@@ -70,16 +85,7 @@ pub fn refine(
     seed: u64,
 ) -> Report {
     let n_states = evidence.n_states();
-    let mut slots: Vec<Option<Slot>> = Vec::new();
-    let mut size = 0;
-    for (j, joint) in tree.joints.iter().enumerate() {
-        slots.push((free[j] && joint.screw.kind != JointKind::Fixed).then(|| {
-            let n_shape = if joint.screw.kind.turns() { 4 } else { 2 };
-            let slot = Slot { shape: size, n_shape, values: size + n_shape };
-            size += n_shape + n_states - 1;
-            slot
-        }));
-    }
+    let (slots, size) = slots(tree, free, n_states);
     let mut report = Report { sigmas: vec![[0.0; 3]; tree.joints.len()], ..Report::default() };
     if size == 0 {
         return report;
@@ -290,7 +296,8 @@ fn residual(evidence: &Evidence, s: &Sample, t: usize, m: &Pose, gate: f64) -> O
     (r.abs() < gate).then_some((r, n, x))
 }
 
-fn update(tree: &mut KinematicTree, slots: &[Option<Slot>], step: &DVector<f64>) {
+/// Adds a step to the unknowns.
+pub fn update(tree: &mut KinematicTree, slots: &[Option<Slot>], step: &DVector<f64>) {
     for (joint, slot) in tree.joints.iter_mut().zip(slots) {
         let Some(slot) = slot else { continue };
         let [b1, b2] = square(joint.screw.axis);

@@ -205,7 +205,7 @@ fn frames(evidence: &Evidence, labels: &[u8], seed: u64) -> Vec<Pose> {
 }
 
 /// Values count from the first state, mostly upwards; limits are what was seen.
-fn tidy(tree: &mut KinematicTree) {
+pub fn tidy(tree: &mut KinematicTree) {
     for joint in &mut tree.joints {
         let zero = joint.values[0];
         joint.values.iter_mut().for_each(|v| *v -= zero);

@@ -6,6 +6,7 @@
 
 use glam::DVec3;
 use hingecast_geom::{KinematicTree, Pose};
+use nalgebra::Vector6;
 
 /// Angular and linear velocity of a rigid motion about the world's origin.
 #[derive(Clone, Copy, Debug)]
@@ -31,6 +32,16 @@ impl Twist {
 
     fn minus(&self, o: &Self) -> Self {
         Self { w: self.w - o.w, v: self.v - o.v }
+    }
+
+    /// Linear velocity of the world's origin, then angular velocity.
+    pub fn vector(&self) -> Vector6<f64> {
+        let (v, w) = (self.v, self.w);
+        Vector6::new(v.x, v.y, v.z, w.x, w.y, w.z)
+    }
+
+    pub fn from_vector(x: &Vector6<f64>) -> Self {
+        Self { v: DVec3::new(x[0], x[1], x[2]), w: DVec3::new(x[3], x[4], x[5]) }
     }
 
     pub fn at(&self, x: DVec3) -> DVec3 {

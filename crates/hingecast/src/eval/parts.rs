@@ -1,10 +1,10 @@
-//! Parts and joints alone, right after the stage that finds them: minutes instead of hours for a whole grid of protocols.
+//! Parts and joints alone, without meshes: minutes instead of hours for a whole grid of protocols.
 
 use super::joints::{JointErrors, errors};
 use super::matching::{POINTS, match_points, surface_points};
 use super::{recording_of, reference_meshes, tree_accuracy};
 use crate::failure::Result;
-use crate::pipeline::screw;
+use crate::pipeline::{joints, labelled, screw};
 use crate::stage::RunFolder;
 use hingecast_capture::Truth;
 use serde::{Deserialize, Serialize};
@@ -23,7 +23,7 @@ pub struct PartsEvaluation {
     pub doubts: Vec<String>,
 }
 
-/// Evaluates the stage `parts` of `run` (method `screw`).
+/// Evaluates the stage `parts` of `run` (method `screw`), or `joints` if that is done too.
 ///
 /// # Errors
 /// When the stage is not done, or the truth is not of this recording.
@@ -32,16 +32,18 @@ pub fn evaluate_parts(run: &Path, truth: &Path) -> Result<PartsEvaluation> {
     let truth = Truth::open(truth)?;
     recording_of(&folder, &truth)?;
     let found = screw::load(run)?;
+    // Where pictures had a say, theirs is the last word.
+    let tree = if folder.has("joints") { joints::load(run)?.tree } else { found.tree };
     let meshes = reference_meshes(&truth)?;
     let true_points = surface_points(&meshes);
-    let found_points = screw::canonical_points(run, &found.tree, POINTS)?;
-    let matching = match_points(&found_points, &true_points, &found.tree, &truth.tree);
+    let found_points = labelled::canonical_points(run, &tree, POINTS)?;
+    let matching = match_points(&found_points, &true_points, &tree, &truth.tree);
     Ok(PartsEvaluation {
         object: truth.object.clone(),
         true_parts: truth.tree.parts.len(),
-        found_parts: found.tree.parts.len(),
-        tree_accuracy: tree_accuracy(&found.tree, &truth.tree, &matching),
-        joints: errors(&found.tree, &truth.tree, &matching, &meshes, truth.diagonal),
+        found_parts: tree.parts.len(),
+        tree_accuracy: tree_accuracy(&tree, &truth.tree, &matching),
+        joints: errors(&tree, &truth.tree, &matching, &meshes, truth.diagonal),
         secs: folder.record.total_secs(),
         doubts: found.doubts,
     })

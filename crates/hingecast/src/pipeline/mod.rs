@@ -1,9 +1,11 @@
 //! `hingecast build`: the stages from a recording to a twin, each kept while its stamp fits.
 
 pub mod joints;
+pub mod labelled;
 pub mod labels;
 pub mod motion;
 pub mod overrides;
+pub mod placed;
 pub mod screw;
 pub mod splat;
 pub mod surface;
@@ -121,7 +123,7 @@ pub fn build(recording: &Path, run: &Path, config: &Config, threads: usize, span
             let at = folder.begin(stage, &stamps[i])?;
             match (config.method, *stage) {
                 (Method::Screw, "parts") => screw::run_parts(&context, &at)?,
-                (Method::Screw, "splat") => screw::run_splat(&context, run, &at)?,
+                (Method::Screw, "splat") => placed::run(&context, run, &at)?,
                 (Method::Screw, "joints") => screw::run_joints(&context, run, &at)?,
                 (Method::Track, "splat") => splat::run(&context, &at)?,
                 (Method::Track, "motion") => motion::run(&context, run, &at)?,
@@ -133,8 +135,12 @@ pub fn build(recording: &Path, run: &Path, config: &Config, threads: usize, span
             folder.finish(stage, &stamps[i], secs)?;
             ui.say(&format!("{stage:<7} {secs:.1} s"));
         }
-        if config.method == Method::Screw && i == 0 {
-            context.cameras = screw::load(run)?.cameras;
+        if config.method == Method::Screw {
+            match *stage {
+                "parts" => context.cameras = screw::load(run)?.cameras,
+                "splat" => placed::load(run)?.correct(&recording, &mut context.cameras),
+                _ => {}
+            }
         }
     }
     Ok(folder)

@@ -27,7 +27,7 @@ pub fn unproject(view: &View, stride: usize, emit: &mut dyn FnMut(DVec3, usize))
 }
 
 /// Normal at pixel `i` from its neighbours' depth, towards the camera; `None` at edges and grazing angles.
-fn normal(view: &View, i: usize) -> Option<Vec3> {
+pub fn normal(view: &View, i: usize) -> Option<Vec3> {
     let c = &view.camera;
     let (x, y) = (i % c.width, i / c.width);
     if x == 0 || y == 0 || x + 1 >= c.width || y + 1 >= c.height {

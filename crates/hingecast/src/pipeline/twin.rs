@@ -2,7 +2,7 @@
 
 use super::joints::JointsFile;
 use super::labels::Labeller;
-use super::{Context, joints, screw, splat};
+use super::{Context, joints, labelled, splat};
 use crate::config::Method;
 use crate::failure::{Failure, Result};
 use crate::stage::{read_json, write_json};
@@ -20,7 +20,7 @@ pub fn run(context: &Context, run: &Path) -> Result<Vec<String>> {
 
     // Labels of all frames first: the engine uses all threads for one picture.
     let mut labels = match context.config.method {
-        Method::Screw => screw::pixel_labels(context, run, &frames)?,
+        Method::Screw => labelled::pixel_labels(context, run, &frames)?,
         Method::Track => rendered_labels(context, &frames, &gaussians, &found, extent.diagonal)?,
     };
 

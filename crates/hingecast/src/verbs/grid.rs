@@ -88,8 +88,15 @@ fn one(
 ) -> Result<PartsEvaluation> {
     let (recording, run) = (place.join("recordings").join(name), place.join("runs").join(name));
     record_once(session, name, synth_config, &recording)?;
-    let span = Span { to: Some("parts".into()), ..Span::default() };
-    pipeline::build(&recording, &run, build_config, session.threads, &span, &session.ui)?;
+    let build_to = |stage: &str| {
+        let span = Span { to: Some(stage.into()), ..Span::default() };
+        pipeline::build(&recording, &run, build_config, session.threads, &span, &session.ui)
+    };
+    build_to("parts")?;
+    if !pipeline::screw::load(&run)?.information.is_empty() {
+        // Noise: the pictures are asked as well.
+        build_to("joints")?;
+    }
     let evaluation = evaluate_parts(&run, &Truth::folder_of(&recording))?;
     if tidy {
         let _ = std::fs::remove_dir_all(&recording);
