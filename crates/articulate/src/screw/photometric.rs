@@ -93,6 +93,9 @@ pub fn refine(
 ) -> Result<Refined, SplatError> {
     let n_states = information.len();
     let mut guess = Guess { tree: tree.clone(), rig: vec![Pose::IDENTITY; n_states] };
+    if tree.joints.is_empty() {
+        return Ok(Refined { first: tree.poses(&[]), tree: guess.tree, rig: guess.rig, cost: [0.0; 2] });
+    }
     let (slots, zeros) = slots(tree, &vec![true; tree.joints.len()], n_states);
     let mut problem = Problem {
         shots,
@@ -411,6 +414,15 @@ mod tests {
         let left = refined.rig[1] * rig().inverse();
         assert!(left.trans.length() < 0.003 && left.angle() < 0.003, "{left:?}");
         assert!(refined.cost[1] < refined.cost[0]);
+    }
+
+    #[test]
+    fn nothing_moves_where_there_is_no_joint() {
+        let mut engine = engine(600, 4.0);
+        let shots = shots(&mut engine, &rig());
+        let still = KinematicTree { parts: vec!["base".into(), "part_1".into()], joints: Vec::new() };
+        let refined = refine(&mut engine, &shots, &still, &known(1.0), &Progress::default()).unwrap();
+        assert!(refined.tree == still && refined.rig == [Pose::IDENTITY; 3]);
     }
 
     /// Depth that is sure keeps the last word, wrong or not.

@@ -83,7 +83,7 @@ pub fn surfaces(run: &Path, n_states: usize, rig: &[Pose]) -> Result<Vec<Labelle
     Ok((0..n_states).into_par_iter().map(of_state).collect())
 }
 
-/// Part of every pixel of `frames`: that of the nearest labelled sample of its state.
+/// Part of every pixel of `frames`: that of the labelled sample of its state which lies nearest in its plane.
 pub fn pixel_labels(context: &Context, run: &Path, frames: &[usize]) -> Result<Vec<Vec<u8>>> {
     let by_state = surfaces(run, context.recording.n_states, &placed::load(run)?.rig)?;
     let reach = (2.0 * screw::load(run)?.voxel).powi(2);
