@@ -114,6 +114,26 @@ fn one_thread_or_two_give_the_same_bytes() {
     }
 }
 
+/// Noisy recordings: the pictures are asked about joints and frames, and that depends on the number of threads no more.
+#[test]
+fn noise_asks_the_pictures_too() {
+    let dir = tempfile::tempdir().unwrap();
+    let dir = dir.path();
+    hingecast(dir, "synth hinged_box -o rec --states 5 --views 12 --test-views 1 --size 96 --noise d435 -q").done();
+    for threads in [1, 2] {
+        hingecast(dir, &format!("build rec -o run{threads} --to joints --threads {threads} -q {TINY}")).done();
+    }
+    for stage in &SCREW[..3] {
+        assert_same_bytes(&dir.join("run1").join(stage), &dir.join("run2").join(stage));
+    }
+    let placed: serde_json::Value = serde_json::from_str(&text(&dir.join("run1/splat/placed.json"))).unwrap();
+    assert_eq!(placed["rig"].as_array().unwrap().len(), 5);
+    let nats = |k: usize| placed["nats"][k].as_f64().unwrap();
+    assert!(nats(1) < nats(0), "{} -> {}", nats(0), nats(1));
+    let joints: serde_json::Value = serde_json::from_str(&text(&dir.join("run1/joints/joints.json"))).unwrap();
+    assert_eq!(joints["tree"], placed["tree"]);
+}
+
 #[test]
 fn another_seed_gives_another_twin() {
     let dir = tempfile::tempdir().unwrap();
