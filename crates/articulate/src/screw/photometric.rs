@@ -166,7 +166,8 @@ impl Problem<'_> {
             let mut gradient = Vector6::zeros();
             let mut by_joints = DMatrix::zeros(6, size);
             for part in 0..poses.len() {
-                let here = self.columns(&guess.tree, state, part, &poses, &guess.rig[state]);
+                let here = self.columns(&guess.tree, state, part, &poses);
+                let here: Vec<_> = here.into_iter().map(|(i, t)| (i, t.moved(&guess.rig[state]).vector())).collect();
                 let mut add = |g: &Vector6<f64>, h: &Matrix6<f64>, columns: &[(usize, Vector6<f64>)]| {
                     hessian += h;
                     gradient += g;
@@ -186,8 +187,8 @@ impl Problem<'_> {
                 let moved = guess.rig[state] * poses[part] * zero[part].inverse();
                 let off = log(&(moved * self.depth[state][part].inverse()));
                 let h = &self.information[state][part];
-                let there = self.columns(&guess.tree, 0, part, &zero, &Pose::IDENTITY);
-                let since = there.into_iter().map(|(i, c)| (i, -Twist::from_vector(&c).moved(&moved).vector()));
+                let there = self.columns(&guess.tree, 0, part, &zero);
+                let since = there.into_iter().map(|(i, t)| (i, -t.moved(&moved).vector()));
                 let columns: Vec<_> = here.into_iter().chain(since).collect();
                 out.cost += 0.5 * off.dot(&(h * off));
                 add(&(h * off), h, &columns);
@@ -197,22 +198,15 @@ impl Problem<'_> {
         out
     }
 
-    /// The unknowns that move a part in a state, each with the twist that it causes.
-    fn columns(
-        &self,
-        tree: &KinematicTree,
-        state: usize,
-        part: usize,
-        poses: &[Pose],
-        rig: &Pose,
-    ) -> Vec<(usize, Vector6<f64>)> {
+    /// The unknowns that move a part in a state, each with the twist that it causes before the state's frame moves it on.
+    fn columns(&self, tree: &KinematicTree, state: usize, part: usize, poses: &[Pose]) -> Vec<(usize, Twist)> {
         let mut out = Vec::new();
         for j in tree.ancestry(part) {
             let Some(slot) = self.slots[j] else { continue };
             let twists = twists(tree, j, state, poses);
-            let shape = twists[..slot.n_shape].iter().enumerate().map(|(k, t)| (slot.shape + k, t));
             let value = if state > 0 { slot.values + state - 1 } else { self.zeros + j };
-            out.extend(shape.chain([(value, &twists[4])]).map(|(i, t)| (i, t.moved(rig).vector())));
+            out.extend(twists[..slot.n_shape].iter().enumerate().map(|(k, t)| (slot.shape + k, *t)));
+            out.push((value, twists[4]));
         }
         out
     }

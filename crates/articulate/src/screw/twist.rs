@@ -40,10 +40,6 @@ impl Twist {
         Vector6::new(v.x, v.y, v.z, w.x, w.y, w.z)
     }
 
-    pub fn from_vector(x: &Vector6<f64>) -> Self {
-        Self { v: DVec3::new(x[0], x[1], x[2]), w: DVec3::new(x[3], x[4], x[5]) }
-    }
-
     pub fn at(&self, x: DVec3) -> DVec3 {
         self.v + self.w.cross(x)
     }
