@@ -4,28 +4,32 @@
 use super::doubts::CORRELATED;
 use super::evidence::Evidence;
 use super::settle::Settled;
-use nalgebra::{Matrix6, Vector6};
+use super::twist::along;
+use nalgebra::Matrix6;
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
 /// Nats per squared twist (v, w): rows of the upper triangle, one after the other.
 #[derive(Clone, Debug, Serialize, Deserialize)]
-pub struct Information(Vec<f64>);
+pub struct Information([f64; 21]);
+
+/// Row and column of every entry.
+fn places() -> impl Iterator<Item = (usize, usize)> {
+    (0..6).flat_map(|i| (i..6).map(move |k| (i, k)))
+}
 
 impl Information {
     pub fn new(m: &Matrix6<f64>) -> Self {
-        Self((0..6).flat_map(|i| (i..6).map(move |k| (i, k))).map(|at| m[at]).collect())
+        let mut out = [0.0; 21];
+        out.iter_mut().zip(places()).for_each(|(entry, at)| *entry = m[at]);
+        Self(out)
     }
 
-    /// The whole matrix; what a damaged file leaves out counts as nothing known.
+    /// The whole matrix.
     pub fn matrix(&self) -> Matrix6<f64> {
-        let mut entries = self.0.iter();
         let mut m = Matrix6::zeros();
-        for i in 0..6 {
-            for k in i..6 {
-                m[(i, k)] = entries.next().copied().unwrap_or(0.0);
-                m[(k, i)] = m[(i, k)];
-            }
+        for (entry, (i, k)) in self.0.iter().zip(places()) {
+            (m[(i, k)], m[(k, i)]) = (*entry, *entry);
         }
         m
     }
@@ -38,9 +42,7 @@ pub fn of_parts(evidence: &Evidence, labels: &[Vec<u8>], found: &Settled) -> Vec
         let cloud = &evidence.clouds[state];
         let mut sums = vec![Matrix6::zeros(); found.tree.parts.len()];
         for ((x, n), part) in cloud.points.iter().zip(&cloud.normals).zip(&labels[state]) {
-            let (x, n) = (x.as_dvec3(), n.as_dvec3());
-            let turn = x.cross(n);
-            let row = Vector6::new(n.x, n.y, n.z, turn.x, turn.y, turn.z);
+            let row = along(n.as_dvec3(), x.as_dvec3());
             sums[*part as usize] += row * row.transpose() * weight;
         }
         sums.iter().map(Information::new).collect()

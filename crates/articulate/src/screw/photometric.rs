@@ -159,6 +159,7 @@ impl Problem<'_> {
         let size = self.size();
         let mut out = Sums { a: DMatrix::zeros(size, size), b: DVector::zeros(size), cost: 0.0, frames: Vec::new() };
         let zero = guess.tree.poses_at(0);
+        let at_zero: Vec<_> = (0..zero.len()).map(|part| self.columns(&guess.tree, 0, part, &zero)).collect();
         for (state, seen) in seen.iter().enumerate() {
             out.cost += self.weight * seen.cost;
             let poses = guess.tree.poses_at(state);
@@ -187,8 +188,7 @@ impl Problem<'_> {
                 let moved = guess.rig[state] * poses[part] * zero[part].inverse();
                 let off = log(&(moved * self.depth[state][part].inverse()));
                 let h = &self.information[state][part];
-                let there = self.columns(&guess.tree, 0, part, &zero);
-                let since = there.into_iter().map(|(i, t)| (i, -t.moved(&moved).vector()));
+                let since = at_zero[part].iter().map(|(i, t)| (*i, -t.moved(&moved).vector()));
                 let columns: Vec<_> = here.into_iter().chain(since).collect();
                 out.cost += 0.5 * off.dot(&(h * off));
                 add(&(h * off), h, &columns);

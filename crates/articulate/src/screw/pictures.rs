@@ -5,7 +5,8 @@
 //! the point X of its pixel, and the pixel's colour changes by -grad(I) . dpi/dX (v + w x X). That neglects occlusion, so steps are longer or
 //! shorter than they should be, but they go down.
 
-use glam::{DVec2, DVec3};
+use super::twist::along;
+use glam::DVec3;
 use hingecast_geom::Camera;
 use hingecast_splat::{Engine, Gradients, PixelGradients, Render, RenderOptions, SplatError, Target};
 use nalgebra::{Matrix2, Matrix2x6, Matrix6, Vector2, Vector6};
@@ -82,15 +83,13 @@ impl ByPart {
                     s += g * g.transpose() * f64::from(weights[3 * i + c]);
                 }
                 let z = f64::from(render.depth[i] / render.alpha[i]);
-                let uv = DVec2::new(x as f64 + 0.5, y as f64 + 0.5);
-                let (u, v) = ((uv.x - camera.cx) / camera.fx, (uv.y - camera.cy) / camera.fy);
+                let (u, v) = ((x as f64 + 0.5 - camera.cx) / camera.fx, (y as f64 + 0.5 - camera.cy) / camera.fy);
                 let point = world_from_camera.apply(DVec3::new(u * z, v * z, z));
                 // d(uv)/dX, X in the world: rows.
                 let rows = [(r.row(0) - r.row(2) * u) * (camera.fx / z), (r.row(1) - r.row(2) * v) * (camera.fy / z)];
                 let mut flow = Matrix2x6::zeros();
                 for (k, row) in rows.iter().enumerate() {
-                    let turn = point.cross(*row);
-                    flow.set_row(k, &Vector6::new(row.x, row.y, row.z, turn.x, turn.y, turn.z).transpose());
+                    flow.set_row(k, &along(*row, point).transpose());
                 }
                 self.hessian[part] += flow.transpose() * s * flow;
             }

@@ -45,6 +45,12 @@ impl Twist {
     }
 }
 
+/// How far a twist [`Twist::vector`] takes the point `x` along `n`: n . (v + w x X) as a row over (v, w).
+pub fn along(n: DVec3, x: DVec3) -> Vector6<f64> {
+    let turn = x.cross(n);
+    Vector6::new(n.x, n.y, n.z, turn.x, turn.y, turn.z)
+}
+
 /// Directions square to `a`.
 pub fn square(a: DVec3) -> [DVec3; 2] {
     let b = a.any_orthonormal_vector();
