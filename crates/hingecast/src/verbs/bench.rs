@@ -12,8 +12,40 @@ use hingecast_capture::object::ArticulatedObject;
 use hingecast_capture::synth::SynthConfig;
 use std::path::{Path, PathBuf};
 
-/// Object names of the suites, sorted.
-pub fn objects(suite: &[String]) -> Result<Vec<String>> {
+/// An object of a suite.
+pub struct Named {
+    /// As on the command line: a name, or a path.
+    pub argument: String,
+    /// What its folders are called; no path.
+    pub name: String,
+}
+
+/// What the folders of an object are called: after its own folder or file, wherever that lies.
+pub fn name_of(argument: &str) -> String {
+    let path = Path::new(argument);
+    let own = if path.is_file() { path.file_stem() } else { path.file_name() };
+    own.map_or_else(|| "object".to_string(), |n| n.to_string_lossy().into_owned())
+}
+
+/// Objects of the suites, each suite sorted. What is not there, or would share a folder with another, is noticed now and not after an hour.
+pub fn objects(suite: &[String]) -> Result<Vec<Named>> {
+    let mut objects: Vec<Named> = Vec::new();
+    for argument in arguments(suite)? {
+        ArticulatedObject::resolve(&argument)?;
+        let name = name_of(&argument);
+        if let Some(twin) = objects.iter().find(|o| o.name == name) {
+            return Err(Failure::new(
+                format!("two objects are named {name}"),
+                format!("{} and {argument}", twin.argument),
+                "give their folders instead of their files, or each an --out of its own",
+            ));
+        }
+        objects.push(Named { argument, name });
+    }
+    Ok(objects)
+}
+
+fn arguments(suite: &[String]) -> Result<Vec<String>> {
     let mut out = Vec::new();
     for name in suite {
         match name.as_str() {
@@ -50,22 +82,18 @@ fn listed(folder: &Path) -> Vec<String> {
 }
 
 pub fn run(session: &Session, args: &Bench) -> Result<Outcome> {
-    let names = objects(&args.suite)?;
-    // A name that is not there, or a baseline, is noticed now and not after an hour.
-    for name in &names {
-        ArticulatedObject::resolve(name)?;
-    }
+    let suite = objects(&args.suite)?;
     if args.joints {
-        return super::grid::run(session, args, &names);
+        return super::grid::run(session, args, &suite);
     }
     let synth_config = synth::config(&args.synth, args.recording_seed, true)?;
     let build_config = build::config(&args.build)?;
     let before: Option<Vec<Evaluation>> = args.against.as_deref().map(read_json).transpose()?;
     let mut evaluations: Vec<Evaluation> = Vec::new();
-    for name in &names {
+    for Named { argument, name } in &suite {
         session.ui.say(&format!("== {name}"));
         let (recording, run) = (args.out.join("recordings").join(name), args.out.join("runs").join(name));
-        match one(session, name, &recording, &run, &synth_config, &build_config) {
+        match one(session, argument, &recording, &run, &synth_config, &build_config) {
             Ok(evaluation) => {
                 session.ui.say(&table::detail(&evaluation));
                 evaluations.push(evaluation);
@@ -84,7 +112,7 @@ pub fn run(session: &Session, args: &Bench) -> Result<Outcome> {
     let path = args.out.join("bench.md");
     std::fs::write(&path, &text).map_err(Failure::io(&path))?;
     session.answer(&evaluations);
-    let mut outcome = if evaluations.len() < names.len() { Outcome::UnderBar } else { Outcome::Done };
+    let mut outcome = if evaluations.len() < suite.len() { Outcome::UnderBar } else { Outcome::Done };
     if let Some(before) = &before {
         let worse = compare(before, &evaluations);
         worse.iter().for_each(|w| session.ui.say(&format!("worse: {w}")));
@@ -97,13 +125,13 @@ pub fn run(session: &Session, args: &Bench) -> Result<Outcome> {
 
 fn one(
     session: &Session,
-    name: &str,
+    argument: &str,
     recording: &Path,
     run: &Path,
     synth_config: &SynthConfig,
     build_config: &hingecast::config::Config,
 ) -> Result<Evaluation> {
-    record_once(session, name, synth_config, recording)?;
+    record_once(session, argument, synth_config, recording)?;
     RunFolder::may_become_run(run)?;
     let folder = pipeline::build(recording, run, build_config, session.threads, &Span::default(), &session.ui)?;
     report::write(&folder)?;
@@ -111,14 +139,14 @@ fn one(
 }
 
 /// Records, unless the same object lies there recorded with the same settings.
-pub fn record_once(session: &Session, name: &str, config: &SynthConfig, recording: &Path) -> Result<()> {
+pub fn record_once(session: &Session, argument: &str, config: &SynthConfig, recording: &Path) -> Result<()> {
     let note = recording.with_extension("synth.json");
     let settings = serde_json::to_value(config).expect("plain data");
     let noted: Option<serde_json::Value> = std::fs::read(&note).ok().and_then(|b| serde_json::from_slice(&b).ok());
     if noted.as_ref() == Some(&settings) && recording.join("transforms.json").exists() {
         return Ok(());
     }
-    synth::record(session, name, config, recording)?;
+    synth::record(session, argument, config, recording)?;
     write_json(&note, &settings)
 }
 

@@ -1,6 +1,6 @@
 //! `hingecast demo`: record, build, evaluate, report, in one go and a few minutes.
 
-use super::{Outcome, Session, synth, table};
+use super::{Outcome, Session, bench, synth, table};
 use crate::cli::Demo;
 use hingecast::config::{Config, Preset};
 use hingecast::eval::evaluate;
@@ -13,8 +13,7 @@ use hingecast_capture::synth::SynthConfig;
 use std::path::Path;
 
 pub fn run(session: &Session, args: &Demo) -> Result<Outcome> {
-    let name = Path::new(&args.object).file_name().unwrap_or("object".as_ref());
-    let out = args.out.clone().unwrap_or_else(|| Path::new("runs/demo").join(name));
+    let out = args.out.clone().unwrap_or_else(|| Path::new("runs/demo").join(bench::name_of(&args.object)));
     let (recording, run) = (out.join("recording"), out.join("run"));
     RunFolder::may_become_run(&run)?;
     if !recording.join("transforms.json").exists() {

@@ -1,6 +1,6 @@
 //! `hingecast bench --joints`: parts and joints of every object under every protocol and seed.
 
-use super::bench::record_once;
+use super::bench::{Named, record_once};
 use super::{Outcome, Session, build, synth};
 use crate::cli::Bench;
 use hingecast::config::Config;
@@ -31,7 +31,7 @@ struct Row {
     evaluation: PartsEvaluation,
 }
 
-pub fn run(session: &Session, args: &Bench, names: &[String]) -> Result<Outcome> {
+pub fn run(session: &Session, args: &Bench, suite: &[Named]) -> Result<Outcome> {
     let wanted: Vec<_> =
         PROTOCOLS.iter().filter(|p| args.protocols.is_empty() || args.protocols.iter().any(|n| n == p.0)).collect();
     if wanted.is_empty() {
@@ -53,9 +53,9 @@ pub fn run(session: &Session, args: &Bench, names: &[String]) -> Result<Outcome>
             let recording_seed = args.recording_seed + seed;
             let base = synth::config(&args.synth, recording_seed, true)?;
             let synth_config = SynthConfig { states: *states, views: *views, noise: *noise, test_views: 0, ..base };
-            for name in names {
+            for object in suite {
                 let place = args.out.join("joints").join(protocol).join(format!("seed{recording_seed}"));
-                match one(session, name, &place, &synth_config, &build_config, args.tidy) {
+                match one(session, object, &place, &synth_config, &build_config, args.tidy) {
                     Ok(evaluation) => {
                         session.ui.say(&line(protocol, &evaluation));
                         rows.push(Row { protocol: protocol.to_string(), seed: recording_seed, evaluation });
@@ -80,14 +80,14 @@ pub fn run(session: &Session, args: &Bench, names: &[String]) -> Result<Outcome>
 
 fn one(
     session: &Session,
-    name: &str,
+    object: &Named,
     place: &std::path::Path,
     synth_config: &SynthConfig,
     build_config: &Config,
     tidy: bool,
 ) -> Result<PartsEvaluation> {
-    let (recording, run) = (place.join("recordings").join(name), place.join("runs").join(name));
-    record_once(session, name, synth_config, &recording)?;
+    let (recording, run) = (place.join("recordings").join(&object.name), place.join("runs").join(&object.name));
+    record_once(session, &object.argument, synth_config, &recording)?;
     let build_to = |stage: &str| {
         let span = Span { to: Some(stage.into()), ..Span::default() };
         pipeline::build(&recording, &run, build_config, session.threads, &span, &session.ui)

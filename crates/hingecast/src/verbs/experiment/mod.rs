@@ -3,36 +3,31 @@
 mod cast;
 mod plan;
 
-use super::{Outcome, Session, bench};
+use super::bench::{self, Named};
+use super::{Outcome, Session};
 use crate::cli;
 use cast::Cast;
 use hingecast::experiment::steps::{Clock, Ledger, Steps};
 use hingecast::experiment::{Experiment, plot, table};
 use hingecast::failure::{Failure, Result};
 use hingecast::stage::write_json;
-use hingecast_capture::object::ArticulatedObject;
 use hingecast_geom::ply::write_whole;
 use plan::Plan;
 use std::path::Path;
 
 pub fn run(session: &Session, args: &cli::Experiment) -> Result<Outcome> {
     let plan = Plan::new(args)?;
-    let names = bench::objects(&args.objects)?;
-    for name in &names {
-        ArticulatedObject::resolve(name)?;
-    }
+    let objects = bench::objects(&args.objects)?;
     Experiment::may_become(&args.out)?;
     std::fs::create_dir_all(&args.out).map_err(Failure::io(&args.out))?;
     let mut experiment = Experiment { settings: plan.settings(), demonstrated: Vec::new(), rows: Vec::new() };
-    let mut clock = Clock::new(plan.steps(), names.len());
-    for argument in &names {
+    let mut clock = Clock::new(plan.steps(), objects.len());
+    for Named { argument, name } in &objects {
         clock.next_object();
-        // An object that was given by its path has the name of its folder.
-        let name = Path::new(argument).file_name().map_or(argument.clone(), |n| n.to_string_lossy().into_owned());
-        let root = args.out.join(&name);
+        let root = args.out.join(name);
         std::fs::create_dir_all(&root).map_err(Failure::io(&root))?;
-        let steps = Steps { ui: &session.ui, object: &name, ledger: Ledger::open(&root), clock: &mut clock };
-        let mut cast = Cast { session, plan: &plan, argument, name: &name, root, steps, demonstrated: Vec::new() };
+        let steps = Steps { ui: &session.ui, object: name, ledger: Ledger::open(&root), clock: &mut clock };
+        let mut cast = Cast { session, plan: &plan, argument, name, root, steps, demonstrated: Vec::new() };
         let rows = cast.rows()?;
         experiment.demonstrated.extend(cast.demonstrated);
         experiment.rows.extend(rows);
