@@ -1,8 +1,10 @@
 //! MJCF objects: frames, joints, shapes, defaults; and the project's own samples when they are there.
 
 use glam::{DQuat, DVec3};
+use hingecast_capture::Truth;
 use hingecast_capture::object::ArticulatedObject;
-use hingecast_geom::JointKind;
+use hingecast_capture::synth::{SynthConfig, synth, useful_ranges};
+use hingecast_geom::{JointKind, Progress};
 
 const LAMP: &str = r#"<mujoco model="lamp">
   <compiler angle="degree"/>
@@ -52,6 +54,42 @@ fn nested_bodies_make_a_chain() {
     let turned = DQuat::from_rotation_y(90f64.to_radians()) * DVec3::new(0.3, 0.0, 0.3) + DVec3::Z * 0.02;
     assert!(head.distance(turned) < 1e-9, "{head} {turned}");
     assert!(lamp.part_mesh(0).colors.iter().all(|c| *c == [204, 153, 51]));
+}
+
+const OVEN: &str = r#"<mujoco model="oven">
+  <worldbody>
+    <body name="case">
+      <geom type="box" size="0.2 0.2 0.01" pos="0 0 0.01"/>
+      <geom type="box" size="0.2 0.2 0.01" pos="0 0 0.39"/>
+      <geom type="box" size="0.2 0.01 0.18" pos="0 0.19 0.2"/>
+      <body name="door">
+        <joint name="hinge" type="hinge" axis="0 0 1" pos="0.2 -0.21 0" range="0 90"/>
+        <geom type="box" size="0.2 0.005 0.2" pos="0 -0.21 0.2"/>
+      </body>
+      <body name="rack">
+        <joint name="slide" type="slide" axis="0 -1 0" range="0 0.3"/>
+        <geom type="box" size="0.17 0.15 0.005" pos="0 0 0.2"/>
+      </body>
+    </body>
+  </worldbody>
+</mujoco>"#;
+
+#[test]
+fn a_rack_behind_a_door_is_played_once_the_door_is_open() {
+    let oven = load(OVEN).unwrap();
+    let ranges = useful_ranges(&oven);
+    assert!(!ranges[0].behind && ranges[1].behind, "{ranges:?}");
+    assert!(ranges[1].upper > 0.29, "{ranges:?}");
+    let dir = tempfile::tempdir().unwrap();
+    let out = dir.path().join("rec");
+    let config = SynthConfig { states: 9, views: 1, test_views: 0, size: 16, ..SynthConfig::default() };
+    synth(&oven, &config, &out, &Progress::default()).unwrap();
+    let truth = Truth::open(&Truth::folder_of(&out)).unwrap();
+    let [hinge, slide] = &truth.tree.joints[..] else { panic!("{:?}", truth.tree.joints) };
+    assert!(slide.values[..9].iter().any(|q| *q > 0.29), "{:?}", slide.values);
+    for (door, rack) in hinge.values.iter().zip(&slide.values) {
+        assert!(*rack < 0.05 || *door > 1.0, "the rack goes through the door: {door} {rack}");
+    }
 }
 
 #[test]

@@ -3,8 +3,8 @@
 use super::discover::poses_of;
 use super::evidence::{Evidence, Motion, Sample, Verdict};
 use super::propose::{CROWD, Proposal};
-use super::refine::{self, refine};
-use super::scan::{agreement, scan, whole_range};
+use super::refine::{self, Member, refine};
+use super::scan::{SOUGHT, Scan, Worth, agreement, scan, whole_range};
 use hingecast_geom::{Joint, KinematicTree, Pose};
 
 /// Most samples that a new joint is refined with; all of them refine the finished tree.
@@ -53,7 +53,7 @@ fn polish(evidence: &Evidence, tree: &mut KinematicTree, members: &[Sample], gat
     let child = tree.parts.len() - 1;
     let mut free = vec![false; tree.joints.len()];
     free[child - 1] = true;
-    let members: Vec<(Sample, usize)> = members.iter().map(|s| (*s, child)).collect();
+    let members: Vec<Member> = members.iter().map(|s| Member { sample: *s, part: child, shown: u64::MAX }).collect();
     let settings = refine::Settings { gates: [gate, 0.5 * gate], rounds: 6, partners };
     refine(evidence, tree, &members, &free, &settings, seed);
 }
@@ -69,22 +69,26 @@ fn rescan(evidence: &Evidence, tree: &mut KinematicTree, members: &[Sample], pla
 
 /// The values of a joint that the states agree with best, for `members` of its child; the held ones unless others are better.
 pub fn asked_again(evidence: &Evidence, joint: &Joint, members: &[Sample], place: &[Pose]) -> Vec<f64> {
-    // All samples in the parent's frame as of value 0.
-    let samples: Vec<Sample> = members
-        .iter()
-        .map(|s| {
-            let m = Motion::from((place[s.state] * joint.screw.motion(joint.values[s.state])).inverse());
-            s.moved(&m)
-        })
-        .collect();
-    let range = whole_range(&joint.screw, evidence.extent());
-    let mut found = scan(evidence, &samples, place, &joint.screw, range, 1.0 * evidence.lattice.voxel);
+    let samples = in_parent(joint, members, place);
+    let mut found = rescanned(evidence, joint, &samples, place, SOUGHT);
     for (s, parent) in place.iter().enumerate() {
-        let held = agreement(evidence, s, &samples, &Motion::from(*parent * joint.screw.motion(joint.values[s])));
-        if found.scores[s] < held + BETTER {
+        let held = Motion::from(*parent * joint.screw.motion(joint.values[s]));
+        if found.scores[s] < agreement(evidence, s, &samples, &held, SOUGHT) + BETTER {
             found.values[s] = joint.values[s];
         }
     }
     let zero = found.values[0];
     found.values.iter().map(|v| v - zero).collect()
+}
+
+/// Samples of a joint's child in its parent's frame as of value 0. `place`: world from that frame, per state.
+pub fn in_parent(joint: &Joint, members: &[Sample], place: &[Pose]) -> Vec<Sample> {
+    let back = |s: &Sample| Motion::from((place[s.state] * joint.screw.motion(joint.values[s.state])).inverse());
+    members.iter().map(|s| s.moved(&back(s))).collect()
+}
+
+/// All states asked for the value of a joint, by samples of its child as [`in_parent`] answers them.
+pub fn rescanned(evidence: &Evidence, joint: &Joint, samples: &[Sample], place: &[Pose], worth: Worth) -> Scan {
+    let range = whole_range(&joint.screw, evidence.extent());
+    scan(evidence, samples, place, &joint.screw, range, evidence.lattice.voxel, worth)
 }

@@ -3,7 +3,7 @@
 use super::discover::poses_of;
 use super::evidence::{Evidence, Verdict, contradictions};
 use super::hypotheses::nearest_screw;
-use super::settle::{ASKING, members};
+use super::settle::{ASKING, Owners};
 use glam::DVec3;
 use hingecast_geom::pose::rotation_vector;
 use hingecast_geom::{JointKind, KinematicTree, Pose, Screw};
@@ -55,7 +55,7 @@ pub fn swap(evidence: &Evidence, tree: &mut KinematicTree, verdicts: &mut [Vec<V
 const ALIKE: f64 = 1.0;
 
 /// Hangs parts on their grandparents where one screw says as much there: of two drawers that slide alike, neither carries the other.
-pub fn simplify(evidence: &Evidence, tree: &mut KinematicTree, labels: &[u8]) {
+pub fn simplify(evidence: &Evidence, tree: &mut KinematicTree, owners: &Owners) {
     let n_states = evidence.n_states();
     for j in 0..tree.joints.len() {
         while let Some(up) = tree.joints.iter().find(|up| up.child == tree.joints[j].parent).cloned() {
@@ -64,10 +64,13 @@ pub fn simplify(evidence: &Evidence, tree: &mut KinematicTree, labels: &[u8]) {
             let motions: Vec<Pose> =
                 (0..n_states).map(|s| up.screw.motion(up.values[s]) * joint.screw.motion(joint.values[s])).collect();
             let poses = poses_of(tree, joint.child, n_states);
-            let own = members(evidence, labels, joint.child);
+            let own = owners.members(evidence, joint.child);
             let stride = own.len().div_ceil(ASKING).max(1);
-            let points: Vec<DVec3> =
-                own.iter().step_by(stride).map(|(s, _)| poses[s.state].inverse().apply(s.point.as_dvec3())).collect();
+            let points: Vec<DVec3> = own
+                .iter()
+                .step_by(stride)
+                .map(|m| poses[m.sample.state].inverse().apply(m.sample.point.as_dvec3()))
+                .collect();
             let tolerance = ALIKE * evidence.lattice.voxel as f64;
             let Some((screw, values)) = one_screw(&motions, &points, joint.screw.kind, tolerance) else { break };
             let joint = &mut tree.joints[j];

@@ -2,9 +2,9 @@
 //! hardly determines, pieces that always moved together.
 
 use super::discover::poses_of;
-use super::evidence::{Evidence, Sample};
-use super::refine::{Settings, refine};
-use super::settle::{Settled, members};
+use super::evidence::Evidence;
+use super::refine::{Member, Settings, refine};
+use super::settle::Settled;
 use glam::{DVec3, IVec3, Vec3};
 use hingecast_geom::{Certainty, Joint, JointKind, KinematicTree};
 use std::collections::HashMap;
@@ -38,7 +38,7 @@ pub fn doubts(evidence: &Evidence, found: &Settled, clouds: &[Vec<u8>], seed: u6
         out.push("nothing moves: one part without joints".to_string());
     }
     for (j, joint) in tree.joints.iter().enumerate() {
-        let members = members(evidence, &found.labels, joint.child);
+        let members = found.owners.members(evidence, joint.child);
         let (rival, nats) = rival(evidence, tree, j, &members, seed);
         let rival = rival.joints[j].screw.kind;
         if nats < REFUTED {
@@ -103,7 +103,7 @@ pub fn rival(
     evidence: &Evidence,
     tree: &KinematicTree,
     j: usize,
-    members: &[(Sample, usize)],
+    members: &[Member],
     seed: u64,
 ) -> (KinematicTree, f64) {
     let voxel = evidence.lattice.voxel as f64;
@@ -138,9 +138,9 @@ pub fn two_unknowns(n: usize) -> f64 {
 }
 
 /// Turns a hinge into the slide that moves the part's middle alike, and a slide into a hinge far away.
-fn imitate(joint: &mut Joint, members: &[(Sample, usize)]) -> JointKind {
+fn imitate(joint: &mut Joint, members: &[Member]) -> JointKind {
     let n = members.len().max(1) as f64;
-    let centre = members.iter().map(|m| m.0.point.as_dvec3()).sum::<DVec3>() / n;
+    let centre = members.iter().map(|m| m.sample.point.as_dvec3()).sum::<DVec3>() / n;
     let far = joint.values.iter().copied().fold(0.0, |m: f64, v| if v.abs() > m.abs() { v } else { m });
     let screw = &mut joint.screw;
     if screw.kind.turns() {
@@ -151,7 +151,7 @@ fn imitate(joint: &mut Joint, members: &[(Sample, usize)]) -> JointKind {
         let scale = if far == 0.0 { 0.0 } else { shift / far };
         joint.values.iter_mut().for_each(|v| *v *= scale);
     } else {
-        let reach = members.iter().map(|m| m.0.point.as_dvec3().distance(centre)).fold(0.0, f64::max);
+        let reach = members.iter().map(|m| m.sample.point.as_dvec3().distance(centre)).fold(0.0, f64::max);
         let radius = 20.0 * (reach + far.abs());
         let side = screw.axis.any_orthonormal_vector();
         // Motion along the axis is a small turn about a line to the side.
@@ -201,17 +201,18 @@ fn second_piece(evidence: &Evidence, found: &Settled, clouds: &[Vec<u8>], joint:
 }
 
 /// States in which too little of the part is confirmed.
-fn unseen_states(evidence: &Evidence, found: &Settled, joint: &Joint, members: &[(Sample, usize)]) -> Vec<usize> {
+fn unseen_states(evidence: &Evidence, found: &Settled, joint: &Joint, members: &[Member]) -> Vec<usize> {
     let n = evidence.n_states();
     let between = evidence.between(&poses_of(&found.tree, joint.child, n));
     let stride = members.len().div_ceil(2000).max(1);
     let (mut confirmed, mut asked) = (vec![0usize; n], vec![0usize; n]);
-    for (s, _) in members.iter().step_by(stride) {
+    for Member { sample: s, .. } in members.iter().step_by(stride) {
         let v = evidence.ask_all(s, &between[s.state]);
         for t in (0..n).filter(|t| *t != s.state) {
             asked[t] += 1;
             confirmed[t] += (v.support >> t & 1) as usize;
         }
     }
-    (0..n).filter(|&t| (confirmed[t] as f64) < SEEN * asked[t] as f64).collect()
+    let shown = found.owners.shown[joint.child];
+    (0..n).filter(|&t| shown >> t & 1 == 0 || (confirmed[t] as f64) < SEEN * asked[t] as f64).collect()
 }

@@ -9,6 +9,7 @@
 //! finals         the best proposals adopted, with their axes as found and along their faces
 //! discover       parts one after another, by what they explain (jury) and how usual they are (plausible)
 //! chains         what hangs on what
+//! hidden         states that do not show a part
 //! settle         states' frames, all joints together (refine, twist)
 //! straight       axes along their part's faces, where that explains as much
 //! labels         which part a sample belongs to
@@ -26,6 +27,7 @@ pub mod discover;
 pub mod doubts;
 pub mod evidence;
 mod finals;
+mod hidden;
 mod hypotheses;
 mod information;
 mod jury;

@@ -5,7 +5,7 @@ use super::evidence::{Evidence, Motion, Sample, Verdict};
 use super::hypotheses::{Duel, Hypothesis, distinct, nearest_screw};
 use super::jury::Jury;
 use super::plausible::plausibility;
-use super::scan::{Scan, agreement, points, scan, whole_range};
+use super::scan::{SOUGHT, Scan, agreement, points, scan, whole_range};
 use super::space::{POSSIBLE, TAKEN};
 use crate::icp;
 use glam::DVec3;
@@ -109,7 +109,7 @@ pub fn propose(
                 rng.shuffle(&mut crowd);
                 crowd.truncate(CROWD);
                 let range = whole_range(&h.screw, evidence.extent());
-                let found = scan(evidence, &crowd, place, &h.screw, range, 1.5 * evidence.lattice.voxel);
+                let found = scan(evidence, &crowd, place, &h.screw, range, 1.5 * evidence.lattice.voxel, SOUGHT);
                 let own: Vec<Pose> = (0..n).map(|s| place[s] * h.screw.motion(found.values[s])).collect();
                 let gain = jury.gain(evidence, &own, false);
                 Proposal { parent, source: b, screw: h.screw, scan: found, gain, crowd }
@@ -197,8 +197,8 @@ fn align(
             }
             let uphill = |pose: Pose| {
                 let (forth, back) = (&jury[..jury.len().min(CLIMBING)], &reverse[..reverse.len().min(CLIMBING)]);
-                agreement(evidence, a, forth, &pose.into())
-                    + agreement(evidence, b, back, &(place[b] * pose.inverse()).into())
+                agreement(evidence, a, forth, &pose.into(), SOUGHT)
+                    + agreement(evidence, b, back, &(place[b] * pose.inverse()).into(), SOUGHT)
             };
             let start = place[a] * start;
             let start = if *climbs { climb(start, &near, voxel, &uphill) } else { start };

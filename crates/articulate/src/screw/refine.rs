@@ -12,6 +12,15 @@ use hingecast_geom::{JointKind, KinematicTree, Pose};
 use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
 use rayon::prelude::*;
 
+/// A sample and the part that it belongs to.
+#[derive(Clone, Copy, Debug)]
+pub struct Member {
+    pub sample: Sample,
+    pub part: usize,
+    /// States that it is compared with, one bit each.
+    pub shown: u64,
+}
+
 #[derive(Clone, Copy, Debug)]
 pub struct Settings {
     /// Largest accepted distance in the first and the last round, scene units.
@@ -75,11 +84,11 @@ impl Sums {
     }
 }
 
-/// Improves the joints for which `free` says so, in place. `members`: samples and their parts.
+/// Improves the joints for which `free` says so, in place.
 pub fn refine(
     evidence: &Evidence,
     tree: &mut KinematicTree,
-    members: &[(Sample, usize)],
+    members: &[Member],
     free: &[bool],
     settings: &Settings,
     seed: u64,
@@ -120,7 +129,7 @@ pub fn refine(
 pub fn cost(
     evidence: &Evidence,
     tree: &KinematicTree,
-    members: &[(Sample, usize)],
+    members: &[Member],
     gate: f64,
     partners: usize,
     seed: u64,
@@ -132,7 +141,7 @@ pub fn cost(
 /// One round's question: the same members meet the same states, however often it is asked.
 struct Ask<'a> {
     evidence: &'a Evidence,
-    members: &'a [(Sample, usize)],
+    members: &'a [Member],
     slots: &'a [Option<Slot>],
     /// Unknowns.
     size: usize,
@@ -181,7 +190,7 @@ impl Ask<'_> {
         let n_states = self.evidence.n_states();
         let poses = |tree: &KinematicTree| -> Vec<Vec<Pose>> { (0..n_states).map(|s| tree.poses_at(s)).collect() };
         let (old, new) = (poses(old), poses(new));
-        let gap = |(s, part): &(Sample, usize)| {
+        let gap = |Member { sample: s, part, .. }: &Member| {
             let x = s.point.as_dvec3();
             let in_state =
                 |poses: &[Vec<Pose>], t: usize| poses[t][*part].apply(poses[s.state][*part].inverse().apply(x));
@@ -221,7 +230,7 @@ impl Ask<'_> {
     /// Those of one chunk; the cost is not divided yet.
     fn some(
         &self,
-        chunk: &[(Sample, usize)],
+        chunk: &[Member],
         c: u64,
         chains: &[Vec<usize>],
         poses: &[Vec<Pose>],
@@ -232,10 +241,13 @@ impl Ask<'_> {
         let mut out = Sums::new(self.size);
         let mut weight = 0.0;
         let mut row: Vec<(usize, f64)> = Vec::new();
-        for (sample, part) in chunk {
+        for Member { sample, part, shown } in chunk {
             let back = poses[sample.state][*part].inverse();
             for _ in 0..self.partners.min(n_states - 1) {
                 let t = (sample.state + 1 + rng.usize(..n_states - 1)) % n_states;
+                if shown >> t & 1 == 0 {
+                    continue;
+                }
                 let m = poses[t][*part] * back;
                 out.asked += 1;
                 let Some((r, n, x)) = residual(self.evidence, sample, t, &m, gate) else {
@@ -315,13 +327,13 @@ pub fn update(tree: &mut KinematicTree, slots: &[Option<Slot>], step: &DVector<f
 }
 
 /// Pivots slide along their axes to beside their part: far from it, tilt and shift would be hard to tell apart.
-fn centre_pivots(tree: &mut KinematicTree, members: &[(Sample, usize)]) {
+fn centre_pivots(tree: &mut KinematicTree, members: &[Member]) {
     let poses: Vec<Vec<Pose>> =
         (0..tree.joints.first().map_or(0, |j| j.values.len())).map(|s| tree.poses_at(s)).collect();
     for j in 0..tree.joints.len() {
         let (child, parent) = (tree.joints[j].child, tree.joints[j].parent);
-        let own = members.iter().filter(|m| m.1 == child);
-        let (sum, n) = own.fold((DVec3::ZERO, 0.0), |(sum, n), (s, _)| {
+        let own = members.iter().filter(|m| m.part == child).map(|m| &m.sample);
+        let (sum, n) = own.fold((DVec3::ZERO, 0.0), |(sum, n), s| {
             (sum + poses[s.state][parent].inverse().apply(s.point.as_dvec3()), n + 1.0)
         });
         if n > 0.0 {

@@ -16,10 +16,17 @@ pub struct Scan {
 
 /// What entering space that was seen empty costs against meeting one surface.
 const EMPTY: f32 = 1.5;
-/// What surface counts that a known part explains already.
-const EXPLAINED: f32 = 0.25;
-/// ... and surface that a known part could explain.
-const PERHAPS: f32 = 0.8;
+/// What surface counts that known parts explain, against 1 for surface that none does.
+#[derive(Clone, Copy)]
+pub struct Worth {
+    /// A known part explains it already.
+    pub explained: f32,
+    /// A known part could explain it.
+    pub possible: f32,
+}
+
+/// For parts that are sought.
+pub const SOUGHT: Worth = Worth { explained: 0.25, possible: 0.8 };
 
 /// `samples`: in the parent's canonical frame as of the source state. `parent[s]`: world at s from that frame.
 /// Values from `range[0]` to `range[1]` are tried in steps that move no sample farther than about `step`.
@@ -30,6 +37,7 @@ pub fn scan(
     screw: &Screw,
     range: [f64; 2],
     step: f32,
+    worth: Worth,
 ) -> Scan {
     let reach = if screw.kind.turns() {
         samples.iter().map(|s| screw.distance(s.point.as_dvec3())).fold(0.0, f64::max)
@@ -44,7 +52,7 @@ pub fn scan(
         let mut best = (f32::NEG_INFINITY, 0.0);
         for &q in &grid {
             let m = Motion::from(*place * screw.motion(q));
-            let score = at_least(evidence, state, samples, &m, best.0);
+            let score = at_least(evidence, state, samples, &m, worth, best.0);
             // Of equals the smaller motion.
             if score > best.0 + 1e-6 || (score > best.0 - 1e-6 && q.abs() < f64::abs(best.1)) {
                 best = (score, q);
@@ -57,12 +65,12 @@ pub fn scan(
 }
 
 /// Share of the samples that meet surface, minus what enters empty space.
-pub fn agreement(evidence: &Evidence, state: usize, samples: &[Sample], m: &Motion) -> f32 {
-    at_least(evidence, state, samples, m, f32::NEG_INFINITY)
+pub fn agreement(evidence: &Evidence, state: usize, samples: &[Sample], m: &Motion, worth: Worth) -> f32 {
+    at_least(evidence, state, samples, m, worth, f32::NEG_INFINITY)
 }
 
 /// The agreement, or little once it is sure to stay below `floor`.
-fn at_least(evidence: &Evidence, state: usize, samples: &[Sample], m: &Motion, floor: f32) -> f32 {
+fn at_least(evidence: &Evidence, state: usize, samples: &[Sample], m: &Motion, worth: Worth, floor: f32) -> f32 {
     let n = samples.len() as f32;
     let mut sum = 0.0;
     for (k, s) in samples.iter().enumerate() {
@@ -70,8 +78,8 @@ fn at_least(evidence: &Evidence, state: usize, samples: &[Sample], m: &Motion, f
         if bits & facing_bit(m.rot * s.normal) != 0 {
             sum += match bits & (TAKEN | POSSIBLE) {
                 0 => 1.0,
-                POSSIBLE => PERHAPS,
-                _ => EXPLAINED,
+                POSSIBLE => worth.possible,
+                _ => worth.explained,
             };
         } else if bits & FREE != 0 {
             sum -= EMPTY;

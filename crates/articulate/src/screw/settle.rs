@@ -7,19 +7,37 @@ use super::chains::{simplify, swap};
 use super::discover::{Cost, Discovery, poses_of};
 use super::doubts::{REFUTED, rival};
 use super::evidence::{Evidence, Motion, Sample, Verdict, contradictions};
+use super::hidden;
 use super::labels::label;
-use super::refine::{Report, Settings, refine};
+use super::refine::{Member, Report, Settings, refine};
 use super::straight::straighten;
 use crate::icp::{self, Surface};
 use glam::Vec3;
 use hingecast_geom::{KinematicTree, Pose};
 use rayon::prelude::*;
 
+/// What belongs to which part.
+pub struct Owners {
+    /// Part of every sample of the evidence.
+    pub labels: Vec<u8>,
+    /// Per part, the states that show it, one bit each.
+    pub shown: Vec<u64>,
+}
+
+impl Owners {
+    /// Samples of a part, from states that show it.
+    pub fn members(&self, evidence: &Evidence, part: usize) -> Vec<Member> {
+        let shown = self.shown[part];
+        let own = |(s, l): &(&Sample, &u8)| **l as usize == part && shown >> s.state & 1 == 1;
+        let samples = evidence.samples.iter().zip(&self.labels).filter(own);
+        samples.map(|(s, _)| Member { sample: *s, part, shown }).collect()
+    }
+}
+
 /// The final tree, and what it was found with.
 pub struct Settled {
     pub tree: KinematicTree,
-    /// Part of every sample of the evidence.
-    pub labels: Vec<u8>,
+    pub owners: Owners,
     /// Per state: world from the world that its cameras believed in.
     pub rig: Vec<Pose>,
     pub report: Report,
@@ -51,43 +69,46 @@ pub fn settle(evidence: &mut Evidence, found: &Discovery, seed: u64) -> Settled 
         verdicts = prune(evidence, &mut tree, found.cost);
     }
     labels = label(evidence, &verdicts);
-    slides(evidence, &mut tree, &labels, seed);
+    let shown = hidden::shown(evidence, &mut tree, &labels, &verdicts, seed);
+    if shown.iter().any(|states| *states != u64::MAX) {
+        labels = label(evidence, &judge_all(evidence, &tree));
+    }
+    let mut owners = Owners { labels, shown };
+    slides(evidence, &mut tree, &owners, seed);
     let free = vec![true; tree.joints.len()];
     let noisy = evidence.is_noisy();
     let mut report = Report::default();
     for round in 0..3 {
-        simplify(evidence, &mut tree, &labels);
+        simplify(evidence, &mut tree, &owners);
         if noisy {
-            let moved = frames(evidence, &labels, seed);
+            let moved = frames(evidence, &owners.labels, seed);
             for (r, m) in rig.iter_mut().zip(&moved) {
                 *r = *m * *r;
             }
             evidence.transform(&moved);
         }
-        let members: Vec<(Sample, usize)> =
-            evidence.samples.iter().zip(&labels).map(|(s, l)| (*s, *l as usize)).filter(|m| m.1 != 0).collect();
+        let member = |(s, l): (&Sample, &u8)| {
+            let (part, shown) = (*l as usize, owners.shown[*l as usize]);
+            (part != 0 && shown >> s.state & 1 == 1).then_some(Member { sample: *s, part, shown })
+        };
+        let members: Vec<Member> = evidence.samples.iter().zip(&owners.labels).filter_map(member).collect();
         let gate = if round == 0 { 1.0 } else { 0.6 } * voxel;
         let settings = Settings { gates: [gate, 0.5 * gate], rounds: 6, partners: 6 };
         report = refine(evidence, &mut tree, &members, &free, &settings, seed ^ round);
-        straighten(evidence, &mut tree, &labels, seed);
+        straighten(evidence, &mut tree, &owners, seed);
+        hidden::hold(&mut tree, &owners.shown);
         verdicts = judge_all(evidence, &tree);
-        labels = label(evidence, &verdicts);
+        owners.labels = label(evidence, &verdicts);
     }
     let n = evidence.samples.len();
     let unexplained = (0..n).filter(|&i| verdicts.iter().all(|v| v[i].against != 0)).count() as f64 / n.max(1) as f64;
     tidy(&mut tree);
-    Settled { tree, labels, rig, report, unexplained }
+    Settled { tree, owners, rig, report, unexplained }
 }
 
 /// The verdicts on every sample under every part.
 fn judge_all(evidence: &Evidence, tree: &KinematicTree) -> Vec<Vec<Verdict>> {
     (0..tree.parts.len()).map(|p| evidence.judge(&poses_of(tree, p, evidence.n_states()))).collect()
-}
-
-/// Samples that carry the label of a part.
-pub fn members(evidence: &Evidence, labels: &[u8], part: usize) -> Vec<(Sample, usize)> {
-    let own = evidence.samples.iter().zip(labels).filter(|(_, l)| **l as usize == part);
-    own.map(|(s, _)| (*s, part)).collect()
 }
 
 /// Asks all states for the value of every joint once more, now that all parts are known.
@@ -99,7 +120,8 @@ fn ask_again(evidence: &mut Evidence, tree: &mut KinematicTree, labels: &[u8], s
         // What the other parts explain must not hold this one.
         let others: Vec<Vec<Pose>> = (0..poses.len()).filter(|p| *p != child).map(|p| poses[p].clone()).collect();
         evidence.mark_taken(&others);
-        let mut asking: Vec<Sample> = members(evidence, labels, child).into_iter().map(|m| m.0).collect();
+        let own = evidence.samples.iter().zip(labels).filter(|(_, l)| **l as usize == child);
+        let mut asking: Vec<Sample> = own.map(|(s, _)| *s).collect();
         fastrand::Rng::with_seed(seed ^ j as u64).shuffle(&mut asking);
         asking.truncate(ASKING);
         if !asking.is_empty() {
@@ -112,14 +134,14 @@ fn ask_again(evidence: &mut Evidence, tree: &mut KinematicTree, labels: &[u8], s
 const FAR: f64 = 2.0;
 
 /// Turns hinges that lie far away into slides where a slide explains the recording as well.
-fn slides(evidence: &Evidence, tree: &mut KinematicTree, labels: &[u8], seed: u64) {
+fn slides(evidence: &Evidence, tree: &mut KinematicTree, owners: &Owners, seed: u64) {
     let centre = mean_point(evidence.samples.iter().map(|s| s.point));
     for j in 0..tree.joints.len() {
         let joint = &tree.joints[j];
         if !joint.screw.kind.turns() || joint.screw.distance(centre) < FAR * evidence.extent() as f64 {
             continue;
         }
-        let own = members(evidence, labels, joint.child);
+        let own = owners.members(evidence, joint.child);
         let (slide, nats) = rival(evidence, tree, j, &own, seed);
         if nats < REFUTED {
             *tree = slide;
@@ -206,8 +228,18 @@ fn frames(evidence: &Evidence, labels: &[u8], seed: u64) -> Vec<Pose> {
 
 /// Values count from the first state, mostly upwards; limits are what was seen.
 pub fn tidy(tree: &mut KinematicTree) {
-    for joint in &mut tree.joints {
-        let zero = joint.values[0];
+    for j in 0..tree.joints.len() {
+        let (zero, screw) = (tree.joints[j].values[0], tree.joints[j].screw);
+        if zero != 0.0 {
+            // What hangs on it is moved along to where it is 0 now.
+            let moved = screw.motion(zero);
+            let hangs = |k: &usize| tree.ancestry(tree.joints[*k].parent).contains(&j);
+            for k in (0..tree.joints.len()).filter(hangs).collect::<Vec<_>>() {
+                let below = &mut tree.joints[k].screw;
+                (below.axis, below.pivot) = (moved.rotate(below.axis), moved.apply(below.pivot));
+            }
+        }
+        let joint = &mut tree.joints[j];
         joint.values.iter_mut().for_each(|v| *v -= zero);
         if joint.values.iter().sum::<f64>() < 0.0 {
             joint.screw.axis = -joint.screw.axis;

@@ -9,7 +9,7 @@ use super::doubts::{behind, two_unknowns};
 use super::evidence::{Evidence, Sample};
 use super::propose::MANY_STATES;
 use super::refine::{Settings, cost, refine};
-use super::settle::members;
+use super::settle::Owners;
 use glam::DVec3;
 use hingecast_geom::{KinematicTree, Pose};
 use nalgebra::{Matrix3, Vector3};
@@ -26,14 +26,14 @@ const CLEARLY: f64 = 1.0;
 
 /// Turns axes to where their part's faces say, one joint after another. With few states they may explain the recording a little worse:
 /// two unknowns less are worth their share of evidence.
-pub fn straighten(evidence: &Evidence, tree: &mut KinematicTree, labels: &[u8], seed: u64) {
+pub fn straighten(evidence: &Evidence, tree: &mut KinematicTree, owners: &Owners, seed: u64) {
     let voxel = evidence.lattice.voxel as f64;
     let fit = Settings { gates: [1.0 * voxel, 0.6 * voxel], rounds: 4, partners: 6 };
     for j in 0..tree.joints.len() {
         let (child, screw) = (tree.joints[j].child, tree.joints[j].screw);
-        let own = members(evidence, labels, child);
+        let own = owners.members(evidence, child);
         let parent: Vec<Pose> = poses_of(tree, tree.joints[j].parent, evidence.n_states());
-        let axis = along_faces(&parent, own.iter().map(|m| &m.0), screw.axis, &NEARLY);
+        let axis = along_faces(&parent, own.iter().map(|m| &m.sample), screw.axis, &NEARLY);
         let Some(axis) = axis.filter(|a| a.angle_between(screw.axis) > KNOWN) else {
             continue;
         };

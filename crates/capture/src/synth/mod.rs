@@ -107,7 +107,7 @@ pub fn synth(
         recording: out,
         truth: config.truth.then_some(truth_out),
         frames: shots.len(),
-        ranges: names.zip(ranges).collect(),
+        ranges: names.zip(ranges.iter().map(|r| [r.lower, r.upper])).collect(),
     })
 }
 

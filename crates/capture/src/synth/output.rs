@@ -2,6 +2,7 @@
 
 use super::SynthConfig;
 use super::plan::Shot;
+use super::ranges::UsefulRange;
 use super::render::{Picture, centre_ray};
 use super::scene::Scene;
 use crate::object::ArticulatedObject;
@@ -102,7 +103,7 @@ pub(super) fn write(
 pub(super) fn write_truth(
     object: &ArticulatedObject,
     config: &SynthConfig,
-    ranges: &[[f64; 2]],
+    ranges: &[UsefulRange],
     states: &[Vec<f64>],
     shots: &[Shot],
     root: &Path,
@@ -110,7 +111,7 @@ pub(super) fn write_truth(
     let mut tree = object.tree.clone();
     for (i, joint) in tree.joints.iter_mut().enumerate() {
         joint.values = states.iter().map(|q| q[i]).collect();
-        joint.limits = [ranges[i][0].min(ranges[i][1]), ranges[i][0].max(ranges[i][1])];
+        joint.limits = [ranges[i].lower.min(ranges[i].upper), ranges[i].lower.max(ranges[i].upper)];
     }
     for (part, name) in tree.parts.iter().enumerate() {
         let path = root.join("parts").join(format!("{name}.ply"));

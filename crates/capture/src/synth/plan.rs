@@ -15,8 +15,8 @@ pub(super) struct Shot {
     pub camera: Camera,
 }
 
-/// First and last value of each joint's play.
-pub(super) fn ranges(object: &ArticulatedObject, config: &SynthConfig) -> Result<Vec<[f64; 2]>, CaptureError> {
+/// Where each joint is played: from `lower` to `upper`.
+pub(super) fn ranges(object: &ArticulatedObject, config: &SynthConfig) -> Result<Vec<UsefulRange>, CaptureError> {
     let names: Vec<&str> = object.tree.joints.iter().map(|j| j.name.as_str()).collect();
     if let Some((name, range)) =
         config.ranges.iter().find(|(n, r)| !names.contains(&n.as_str()) || !r.iter().all(|x| x.is_finite()))
@@ -28,22 +28,27 @@ pub(super) fn ranges(object: &ArticulatedObject, config: &SynthConfig) -> Result
             hint,
         ));
     }
-    let useful = useful_ranges(object);
-    let own = |(name, u): (&&str, &UsefulRange)| config.ranges.get(*name).copied().unwrap_or([u.lower, u.upper]);
-    Ok(names.iter().zip(&useful).map(own).collect())
+    let mut useful = useful_ranges(object);
+    for (name, range) in names.iter().zip(&mut useful) {
+        if let Some(&[lower, upper]) = config.ranges.get(*name) {
+            *range = UsefulRange { lower, upper, ..*range };
+        }
+    }
+    Ok(useful)
 }
 
 /// Joint values of the recorded states, then of the held-out ones between them.
-pub(super) fn joint_values(config: &SynthConfig, ranges: &[[f64; 2]]) -> Vec<Vec<f64>> {
+pub(super) fn joint_values(config: &SynthConfig, ranges: &[UsefulRange]) -> Vec<Vec<f64>> {
     let mut rng = fastrand::Rng::with_seed(config.seed ^ 0x706c_6179);
-    let play = play::Play::new(ranges.len(), config.states == 2, &mut rng);
+    let behind: Vec<bool> = ranges.iter().map(|r| r.behind).collect();
+    let play = play::Play::new(&behind, config.states == 2, &mut rng);
     let last = (config.states.max(2) - 1) as f64;
     let held_out = if config.states < 3 { 0 } else { config.test_states };
     // Held-out states stand half-way between two recorded ones, spread over the play.
     let between = (0..held_out).map(|k| (last * (k + 1) as f64 / (held_out + 1) as f64).floor() + 0.5);
     let times = (0..config.states).map(|s| s as f64).chain(between).map(|s| s / last);
-    let value = |[from, to]: [f64; 2], f: f64| from + f * (to - from);
-    times.map(|t| play.fractions(t).into_iter().zip(ranges).map(|(f, &r)| value(r, f)).collect()).collect()
+    let value = |(f, r): (f64, &UsefulRange)| r.lower + f * (r.upper - r.lower);
+    times.map(|t| play.fractions(t).into_iter().zip(ranges).map(value).collect()).collect()
 }
 
 /// All views: per state the training cameras, then the held-out ones.

@@ -12,19 +12,23 @@ pub(crate) struct Play {
 }
 
 impl Play {
+    /// `behind`: of each joint, whether it moves only when others are open; these come last, and nothing is pushed back into their way.
     /// `two_states`: only first and last are recorded, so every joint goes all the way.
-    pub fn new(n_joints: usize, two_states: bool, rng: &mut fastrand::Rng) -> Self {
+    pub fn new(behind: &[bool], two_states: bool, rng: &mut fastrand::Rng) -> Self {
+        let n_joints = behind.len();
         if two_states || n_joints == 1 {
             return Self { sweeps: vec![(0.0, 1.0, false); n_joints] };
         }
         let mut order: Vec<usize> = (0..n_joints).collect();
         rng.shuffle(&mut order);
+        order.sort_by_key(|&j| behind[j]);
+        let push_back = !behind.contains(&true);
         let n = n_joints as f64;
         let length = 1.0 / (n - (n - 1.0) * OVERLAP);
         let mut sweeps = vec![(0.0, 1.0, false); n_joints];
         for (place, &joint) in order.iter().enumerate() {
             let start = place as f64 * length * (1.0 - OVERLAP);
-            sweeps[joint] = (start, start + length, place == 0);
+            sweeps[joint] = (start, start + length, place == 0 && push_back);
         }
         Self { sweeps }
     }

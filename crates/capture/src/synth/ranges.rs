@@ -4,6 +4,9 @@
 //! points of the moving side, follow them from 0 outwards in small steps, and count those whose path pierces a surface of
 //! the other side. The range ends where a fifth has gone through something, at the beginning of that rise. If what is left is wider
 //! than a person would move it, keep the end at which the object is the most compact: that is the closed one.
+//!
+//! A rack behind a door, or a seat below a lid, goes nowhere while all else is closed. What is stuck like that is asked once more with
+//! everything else open.
 
 use super::scene::Scene;
 use crate::object::{ArticulatedObject, PartGeometry};
@@ -16,6 +19,8 @@ pub struct UsefulRange {
     /// Radians or scene units; `lower` is the closed end.
     pub lower: f64,
     pub upper: f64,
+    /// Only when other joints are open: a rack behind a door.
+    pub behind: bool,
 }
 
 /// A person's hand moves a door this far without walking around it.
@@ -28,19 +33,47 @@ const PIERCING: f64 = 0.2;
 /// Share gained in one step that belongs to a collision, not to grazing.
 const RISE: f64 = 0.004;
 
-/// One range a joint of the tree, other joints at 0.
+/// A joint is stuck if it has less than this share of its limits, or of a hand's reach.
+const STUCK: f64 = 0.25;
+/// ... and something else is in its way if it goes this many times farther once that is open.
+const FREED: f64 = 2.0;
+
+/// One range a joint of the tree, other joints at 0, or open if only that frees it.
 pub fn useful_ranges(object: &ArticulatedObject) -> Vec<UsefulRange> {
-    (0..object.tree.joints.len()).map(|j| useful_range(object, j)).collect()
+    let joints = &object.tree.joints;
+    let closed = vec![0.0; joints.len()];
+    let mut ranges: Vec<UsefulRange> = (0..joints.len()).map(|j| useful_range(object, j, &closed)).collect();
+    let width = |r: &UsefulRange| (r.upper - r.lower).abs();
+    let open: Vec<f64> = ranges.iter().map(|r| r.upper).collect();
+    for (j, joint) in joints.iter().enumerate() {
+        let whole = (joint.limits[1] - joint.limits[0]).min(widest(joint.screw.kind));
+        if width(&ranges[j]) < STUCK * whole {
+            let freed = useful_range(object, j, &open);
+            if width(&freed) > FREED * width(&ranges[j]) {
+                ranges[j] = UsefulRange { behind: true, ..freed };
+            }
+        }
+    }
+    ranges
 }
 
-fn useful_range(object: &ArticulatedObject, joint: usize) -> UsefulRange {
+fn widest(kind: JointKind) -> f64 {
+    if kind == JointKind::Prismatic { f64::INFINITY } else { WIDEST_TURN_DEG.to_radians() }
+}
+
+/// `others`: values of all joints; its own does not count.
+fn useful_range(object: &ArticulatedObject, joint: usize, others: &[f64]) -> UsefulRange {
     let j = &object.tree.joints[joint];
     let [lower, upper] = j.limits;
     let rest = 0f64.clamp(lower, upper);
     let moving = subtree(object, j.child);
-    let standing = Scene::new(
-        object.parts.iter().enumerate().filter(|(i, _)| !moving.contains(i)).map(|(_, p)| (p, Default::default())),
-    );
+    // Seen from the parent, which holds the axis.
+    let mut others = others.to_vec();
+    others[joint] = 0.0;
+    let poses = object.tree.poses(&others);
+    let from_world = poses[j.parent].inverse();
+    let standing = object.parts.iter().zip(&poses).enumerate().filter(|(i, _)| !moving.contains(i));
+    let standing = Scene::new(standing.map(|(_, (part, pose))| (part, from_world * *pose)));
     let points = sample(moving.iter().map(|&i| &object.parts[i]));
     let step = (upper - lower) / STEPS as f64;
     let reach = |limit: f64| {
@@ -68,7 +101,7 @@ fn useful_range(object: &ArticulatedObject, joint: usize) -> UsefulRange {
         limit
     };
     let (mut lo, mut hi) = (reach(lower), reach(upper));
-    let widest = if j.screw.kind == JointKind::Prismatic { f64::INFINITY } else { WIDEST_TURN_DEG.to_radians() };
+    let widest = widest(j.screw.kind);
     let compact = |q: f64| {
         let mut all = vec![0.0; object.tree.joints.len()];
         all[joint] = q;
@@ -79,7 +112,8 @@ fn useful_range(object: &ArticulatedObject, joint: usize) -> UsefulRange {
     if hi - lo > widest {
         if low_is_closed { hi = lo + widest } else { lo = hi - widest }
     }
-    UsefulRange { lower: if low_is_closed { lo } else { hi }, upper: if low_is_closed { hi } else { lo } }
+    let (lower, upper) = if low_is_closed { (lo, hi) } else { (hi, lo) };
+    UsefulRange { lower, upper, behind: false }
 }
 
 /// The part and everything it carries.
