@@ -93,7 +93,7 @@ pub fn settle(evidence: &mut Evidence, found: &Discovery, seed: u64) -> Settled 
         };
         let members: Vec<Member> = evidence.samples.iter().zip(&owners.labels).filter_map(member).collect();
         let gate = if round == 0 { 1.0 } else { 0.6 } * voxel;
-        let settings = Settings { gates: [gate, 0.5 * gate], rounds: 6, partners: 6 };
+        let settings = Settings { gates: [gate, 0.5 * gate], rounds: 6, partners: 6, reach: 0.0 };
         report = refine(evidence, &mut tree, &members, &free, &settings, seed ^ round);
         straighten(evidence, &mut tree, &owners, seed);
         hidden::hold(&mut tree, &owners.shown);
