@@ -30,7 +30,7 @@ pub fn align(views: &mut [DepthView], voxel: f32) {
         .map(|view| {
             let stride = view.stride_for(POINTS);
             let mut out = Vec::new();
-            view.planes(stride, &mut |x, n| out.push((x, n)));
+            view.planes(stride, &mut |x, n, _| out.push((x, n)));
             out
         })
         .collect();
@@ -41,7 +41,7 @@ pub fn align(views: &mut [DepthView], voxel: f32) {
         let cloud = merge(
             planes.iter().zip(&corrections).flat_map(|(p, c)| {
                 let (rot, trans) = (c.mat3().as_mat3(), c.trans.as_vec3());
-                p.iter().map(move |(x, n)| (rot * *x + trans, rot * *n))
+                p.iter().map(move |(x, n)| (rot * *x + trans, rot * *n, 1.0))
             }),
             voxel,
             2,

@@ -33,6 +33,8 @@ pub struct Cloud {
 
 /// Largest error of a normal's slope that a pixel's plane may have before its window grows.
 const SLOPE_ERROR: f32 = 0.08;
+/// A window that bends by this many pixels weighs half.
+const BENT: f32 = 0.02;
 /// Steeper views than this (cosine between normal and ray) measure little.
 const GRAZING: f32 = 0.2;
 
@@ -69,8 +71,9 @@ impl DepthView {
             .map_or(4, |(r, _)| r)
     }
 
-    /// Calls `emit(point, normal)` in the world frame for every `stride`-th pixel with a plane.
-    pub fn planes(&self, stride: usize, emit: &mut dyn FnMut(Vec3, Vec3)) {
+    /// Calls `emit(point, normal, weight)` in the world frame for every `stride`-th pixel with a plane. The weight is 1 where the window is one,
+    /// and less where it bends over an edge.
+    pub fn planes(&self, stride: usize, emit: &mut dyn FnMut(Vec3, Vec3, f32)) {
         let (w, h, c) = (self.camera.width, self.camera.height, &self.camera);
         let world_from_camera = c.camera_from_world.inverse();
         let (rot, trans) = (world_from_camera.mat3().as_mat3(), world_from_camera.trans);
@@ -140,7 +143,8 @@ impl DepthView {
                     continue;
                 }
                 let point = rot.as_dmat3() * (ray * (z / (1.0 + solved.z))).as_dvec3() + trans;
-                emit(point.as_vec3(), rot * normal);
+                let bent = worst / (BENT / c.fx as f32 + 4.0 * noise);
+                emit(point.as_vec3(), rot * normal, 1.0 / (1.0 + bent * bent));
             }
         }
     }
@@ -149,11 +153,11 @@ impl DepthView {
 /// Gathers the planes of all views of a state into one sample per voxel of edge `voxel` and facing (one of six).
 /// Samples that fewer than `least` pixels support are dropped as stray.
 pub fn gather(views: &[DepthView], voxel: f32, stride: usize, least: u32) -> Cloud {
-    let planes: Vec<Vec<(Vec3, Vec3)>> = views
+    let planes: Vec<Vec<(Vec3, Vec3, f32)>> = views
         .par_iter()
         .map(|view| {
             let mut out = Vec::new();
-            view.planes(stride, &mut |x, n| out.push((x, n)));
+            view.planes(stride, &mut |x, n, w| out.push((x, n, w)));
             out
         })
         .collect();
@@ -161,15 +165,17 @@ pub fn gather(views: &[DepthView], voxel: f32, stride: usize, least: u32) -> Clo
 }
 
 /// One sample per voxel and facing from oriented points, see [`gather`].
-pub fn merge(planes: impl Iterator<Item = (Vec3, Vec3)>, voxel: f32, least: u32) -> Cloud {
+pub fn merge(planes: impl Iterator<Item = (Vec3, Vec3, f32)>, voxel: f32, least: u32) -> Cloud {
     type Key = ([i32; 3], u8);
-    let mut cells: HashMap<Key, (DVec3, DVec3, u32)> = HashMap::new();
-    for (x, n) in planes {
+    let mut cells: HashMap<Key, (DVec3, DVec3, f64, u32)> = HashMap::new();
+    for (x, n, w) in planes {
         let key: IVec3 = (x / voxel).floor().as_ivec3();
-        let slot = cells.entry((key.to_array(), facing(n))).or_insert((DVec3::ZERO, DVec3::ZERO, 0));
-        slot.0 += x.as_dvec3();
-        slot.1 += n.as_dvec3();
-        slot.2 += 1;
+        let slot = cells.entry((key.to_array(), facing(n))).or_insert((DVec3::ZERO, DVec3::ZERO, 0.0, 0));
+        let w = w as f64;
+        slot.0 += w * x.as_dvec3();
+        slot.1 += w * n.as_dvec3();
+        slot.2 += w;
+        slot.3 += 1;
     }
     // The table's order is not the same in every run. Along Morton's curve, what is asked one after the other lies close together
     // in every state's grid and tree.
@@ -178,11 +184,11 @@ pub fn merge(planes: impl Iterator<Item = (Vec3, Vec3)>, voxel: f32, least: u32)
     cells.sort_by_cached_key(|c| (morton(IVec3::from(c.0.0) - lowest), c.0.1));
     let mut cloud = Cloud::default();
     let mut pixels = Vec::new();
-    for (_, (x, n, count)) in cells {
-        let mean = n / count as f64;
+    for (_, (x, n, weight, count)) in cells {
+        let mean = n / weight;
         // Normals that disagree within a voxel make a sample that faces nowhere.
         if count >= least && mean.length() > 0.7 {
-            cloud.points.push((x / count as f64).as_vec3());
+            cloud.points.push((x / weight).as_vec3());
             cloud.normals.push(mean.normalize().as_vec3());
             pixels.push(count as f32);
         }
@@ -281,10 +287,10 @@ mod tests {
     fn a_noisy_plane_that_straddles_two_layers_becomes_one() {
         let mut rng = fastrand::Rng::with_seed(3);
         // z = 0.2 is where two layers of voxels of edge 0.1 meet; the noise is a fifth of a voxel.
-        let planes: Vec<(Vec3, Vec3)> = (0..40_000)
+        let planes: Vec<(Vec3, Vec3, f32)> = (0..40_000)
             .map(|_| {
                 let z = 0.2 + 0.02 * hingecast_geom::random::normal(&mut rng) as f32;
-                (Vec3::new(3.0 * rng.f32(), 3.0 * rng.f32(), z), Vec3::Z)
+                (Vec3::new(3.0 * rng.f32(), 3.0 * rng.f32(), z), Vec3::Z, 1.0)
             })
             .collect();
         let cloud = merge(planes.into_iter(), 0.1, 2);

@@ -7,7 +7,7 @@ use super::jury::Jury;
 use super::plausible::plausibility;
 use super::propose::{CROWD, Proposal};
 use super::scan::Scan;
-use super::straight::along_faces;
+use super::straight::{ASKEW, along_faces};
 use hingecast_geom::{KinematicTree, Pose, Screw};
 
 /// A proposal, refined.
@@ -36,8 +36,6 @@ pub struct Ground<'a> {
 const NEARLY: [f64; 3] = [0.3, 0.15, 0.04];
 /// One torn sample in so many that are explained may be chance.
 const TORN: usize = 50;
-/// Axes less askew than this are left to refining, radians.
-const ASKEW: f64 = 0.01;
 
 impl Ground<'_> {
     /// Refines a proposal, once more with its axis along its faces, and once more where it has slipped along them. The best of these.
@@ -46,10 +44,6 @@ impl Ground<'_> {
         let straight = self.straight(p, &found).map(|p| self.finish(&p));
         let found = straight.filter(|f| f.merit > found.merit).unwrap_or(found);
         let back = self.unslipped(&found);
-        if std::env::var("HC_DBG").is_ok() {
-            let show = |f: &Final| { let j = f.tree.joints.last().unwrap(); format!("{:?} m {:.0} expl {} torn {} pv {:.2} {:.2} {:.2} q {:?}", j.screw.kind, f.merit, f.explained.len(), f.torn.len(), j.screw.pivot.x, j.screw.pivot.y, j.screw.pivot.z, j.values.iter().map(|v| (v * 100.0).round() / 100.0).collect::<Vec<_>>()) };
-            eprintln!("SLIP {} -> {}", show(&found), back.as_ref().map_or("-".into(), show));
-        }
         back.filter(|f| f.merit > found.merit).unwrap_or(found)
     }
 

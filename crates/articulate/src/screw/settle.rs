@@ -205,7 +205,7 @@ fn frames(evidence: &Evidence, labels: &[u8], seed: u64) -> Vec<Pose> {
         // Everything that stands still, seen by all states together.
         let moved = own.iter().zip(&out).flat_map(|(samples, pose)| {
             let m = Motion::from(*pose);
-            samples.iter().map(move |s| (m.apply(s.point), m.rot * s.normal))
+            samples.iter().map(move |s| (m.apply(s.point), m.rot * s.normal, 1.0))
         });
         let cloud = super::cloud::merge(moved, evidence.lattice.voxel, 2);
         let all = Surface::new(cloud.points, cloud.normals);

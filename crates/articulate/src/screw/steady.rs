@@ -27,7 +27,7 @@ const NEAR: f32 = 1.5;
 pub fn base(evidence: &Evidence, labels: &[Vec<u8>]) -> Surface {
     let still = evidence.clouds.iter().zip(labels).flat_map(|(cloud, labels)| {
         let own = (0..labels.len()).filter(|&i| labels[i] == 0);
-        own.map(|i| (cloud.points[i], cloud.normals[i]))
+        own.map(|i| (cloud.points[i], cloud.normals[i], 1.0))
     });
     // What one state alone has may be mislabelled.
     let least = if evidence.n_states() < MANY_STATES { 1 } else { 2 };
@@ -45,7 +45,7 @@ pub fn align(views: &mut [DepthView], evidence: &Evidence, state: usize, labels:
     views.par_iter_mut().for_each(|view| {
         let stride = view.stride_for(POINTS);
         let (mut points, mut normals) = (Vec::new(), Vec::new());
-        view.planes(stride, &mut |x, n| {
+        view.planes(stride, &mut |x, n, _| {
             if stands(x) {
                 points.push(x);
                 normals.push(n);

@@ -21,11 +21,13 @@ const NEARLY: [f64; 2] = [0.15, 0.04];
 const ENOUGH: f64 = 0.01;
 /// Faces do not know their directions better than this, radians.
 const KNOWN: f64 = 0.001;
-/// With many states an axis along the faces must explain the recording better by this many nats.
+/// With many states, an axis that is nearly along the faces stays unless along them it explains the recording better by this many nats.
 const CLEARLY: f64 = 1.0;
+/// Axes less askew than this are left to refining, radians.
+pub const ASKEW: f64 = 0.01;
 
-/// Turns axes to where their part's faces say, one joint after another. With few states they may explain the recording a little worse:
-/// two unknowns less are worth their share of evidence.
+/// Turns axes to where their part's faces say, one joint after another. With few states, and where the axis is far from there, they may
+/// explain the recording a little worse: two unknowns less are worth their share of evidence.
 pub fn straighten(evidence: &Evidence, tree: &mut KinematicTree, owners: &Owners, seed: u64) {
     let voxel = evidence.lattice.voxel as f64;
     let fit = Settings { gates: [1.0 * voxel, 0.6 * voxel], rounds: 4, partners: 6, reach: 0.0 };
@@ -47,7 +49,8 @@ pub fn straighten(evidence: &Evidence, tree: &mut KinematicTree, owners: &Owners
             straight.joints[j].screw.axis = axis;
         }
         let nats = behind(own.len(), cost(&straight), cost(tree));
-        let most = if evidence.n_states() < MANY_STATES { two_unknowns(own.len()) } else { -CLEARLY };
+        let doubtful = evidence.n_states() < MANY_STATES || axis.angle_between(screw.axis) > ASKEW;
+        let most = if doubtful { two_unknowns(own.len()) } else { -CLEARLY };
         if nats < most {
             *tree = straight;
         }
