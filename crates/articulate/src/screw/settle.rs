@@ -248,3 +248,37 @@ pub fn tidy(tree: &mut KinematicTree) {
         joint.limits = joint.values.iter().fold([0.0f64; 2], |l, v| [l[0].min(*v), l[1].max(*v)]);
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use glam::DVec3;
+    use hingecast_geom::{Joint, JointKind, Screw};
+
+    /// However values are counted, every part goes from state to state as before.
+    #[test]
+    fn counting_from_the_first_state_moves_nothing() {
+        let joint = |parent: usize, axis: DVec3, values: [f64; 3]| Joint {
+            name: "j".into(),
+            parent,
+            child: parent + 1,
+            screw: Screw { kind: JointKind::Revolute, axis: axis.normalize(), pivot: DVec3::new(0.3, -0.1, 0.2) },
+            values: values.to_vec(),
+            limits: [0.0; 2],
+        };
+        let joints = vec![
+            joint(0, DVec3::new(0.2, 0.1, 1.0), [0.4, 0.9, -0.3]),
+            joint(1, DVec3::new(1.0, 0.3, -0.2), [-0.2, -0.4, -0.9]),
+            joint(2, DVec3::new(0.0, 1.0, 0.2), [0.1, 0.5, 0.7]),
+        ];
+        let before = KinematicTree { parts: ["a", "b", "c", "d"].map(String::from).to_vec(), joints };
+        let mut after = before.clone();
+        tidy(&mut after);
+        assert!(after.joints.iter().all(|j| j.values[0] == 0.0 && j.values.iter().sum::<f64>() > 0.0));
+        let x = DVec3::new(0.7, -0.4, 0.9);
+        for (state, part) in (1..3).flat_map(|s| (1..4).map(move |p| (s, p))) {
+            let moved = |tree: &KinematicTree| (tree.poses_at(state)[part] * tree.poses_at(0)[part].inverse()).apply(x);
+            assert!(moved(&before).distance(moved(&after)) < 1e-12, "state {state} part {part}");
+        }
+    }
+}

@@ -174,3 +174,27 @@ fn compare(before: &[Evaluation], now: &[Evaluation]) -> Vec<String> {
     }
     out
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A folder given by its path once was the folder that `--tidy` deletes.
+    #[test]
+    fn objects_given_by_paths_are_named_and_not_two_alike() {
+        let dir = tempfile::tempdir().unwrap();
+        let make = |shelf: &str| {
+            let folder = dir.path().join(shelf).join("oven");
+            std::fs::create_dir_all(&folder).unwrap();
+            let text = "<mujoco><worldbody><geom type=\"sphere\" size=\"1\"/></worldbody></mujoco>";
+            std::fs::write(folder.join("object.xml"), text).unwrap();
+            folder.to_string_lossy().into_owned()
+        };
+        let (a, b) = (make("a"), make("b"));
+        let named = objects(std::slice::from_ref(&a)).unwrap();
+        assert_eq!((named[0].name.as_str(), named[0].argument.as_str()), ("oven", a.as_str()));
+        assert_eq!(name_of(&format!("{a}/object.xml")), "object");
+        let error = objects(&[a, b]).err().unwrap().to_string();
+        assert!(error.contains("two objects are named oven") && error.lines().count() == 3, "{error}");
+    }
+}
