@@ -268,33 +268,31 @@ fn equal_drawers_one_after_another() {
 fn a_drawer_behind_a_door() {
     let boxes = vec![
         vec![
-            cuboid([-0.3, -0.5, -0.3], [0.4, 0.5, -0.26]),
-            cuboid([-0.3, -0.5, 0.36], [0.4, 0.5, 0.4]),
-            cuboid([-0.3, -0.5, -0.26], [0.4, -0.46, 0.36]),
-            cuboid([-0.3, 0.46, -0.26], [0.4, 0.5, 0.36]),
-            cuboid([0.36, -0.46, -0.26], [0.4, 0.46, 0.36]),
+            cuboid([-0.2, -0.4, -0.3], [0.5, 0.4, -0.26]),
+            cuboid([-0.2, -0.4, 0.36], [0.5, 0.4, 0.4]),
+            cuboid([-0.2, -0.4, -0.26], [0.5, -0.36, 0.36]),
+            cuboid([-0.2, 0.36, -0.26], [0.5, 0.4, 0.36]),
+            cuboid([0.46, -0.36, -0.26], [0.5, 0.36, 0.36]),
         ],
-        vec![cuboid([-0.36, -0.5, -0.3], [-0.31, 0.5, 0.4])],
+        vec![cuboid([-0.26, -0.4, -0.3], [-0.21, 0.3, 0.4]), cuboid([-0.33, 0.18, 0.0], [-0.26, 0.22, 0.15])],
         vec![
-            cuboid([-0.24, -0.4, -0.2], [-0.2, 0.4, 0.1]),
-            cuboid([-0.2, -0.4, -0.2], [0.3, 0.4, -0.16]),
-            cuboid([-0.2, -0.4, -0.16], [0.3, -0.36, 0.05]),
-            cuboid([-0.2, 0.36, -0.16], [0.3, 0.4, 0.05]),
+            cuboid([-0.14, -0.3, -0.2], [-0.1, 0.3, 0.1]),
+            cuboid([-0.1, -0.3, -0.2], [0.4, 0.3, -0.16]),
+            cuboid([-0.1, -0.3, -0.16], [0.4, -0.26, 0.05]),
+            cuboid([-0.1, 0.26, -0.16], [0.4, 0.3, 0.05]),
         ],
     ];
-    let open = [0.0, 0.5, 1.0, 1.6, 1.6, 1.6, 1.6, 1.6, 0.0];
-    let out = [0.0, 0.0, 0.0, 0.0, 0.1, 0.25, 0.4, 0.45, 0.45];
-    let door = joint(0, 1, JointKind::Revolute, -DVec3::Z, DVec3::new(-0.36, -0.5, 0.0), &open);
-    // In the last state the door is shut again on the drawer pushed in, which nobody sees.
-    let pushed: Vec<f64> = out.iter().enumerate().map(|(s, q)| if s == 8 { 0.0 } else { *q }).collect();
-    let drawer = |values: &[f64]| joint(0, 2, JointKind::Prismatic, -DVec3::X, DVec3::ZERO, values);
-    let found = find(&boxes, &tree(vec![door.clone(), drawer(&pushed)]));
+    let open = [0.0, 0.4, 0.8, 1.2, 1.6, 1.6, 1.6, 1.6];
+    let out = [0.0, 0.0, 0.0, 0.0, 0.0, 0.15, 0.3, 0.45];
+    let door = joint(0, 1, JointKind::Revolute, DVec3::Z, DVec3::new(-0.26, -0.4, 0.0), &open);
+    let drawer = joint(0, 2, JointKind::Prismatic, -DVec3::X, DVec3::ZERO, &out);
+    let found = find(&boxes, &tree(vec![door.clone(), drawer.clone()]));
     assert_eq!(found.tree.parts.len(), 3, "{:?}", found.tree.parts);
     assert_found(&found, &door);
     // Behind a shut door it is held to stand where it was last seen.
-    let held = assert_found(&found, &drawer(&out));
+    let held = assert_found(&found, &drawer);
     let name = &found.tree.joints[held].name;
-    let doubt = format!("joint '{name}': its part is hardly seen in states [0, 8]; the value there is a guess");
+    let doubt = format!("joint '{name}': its part is hardly seen in state [0]; the value there is a guess");
     assert!(found.doubts.contains(&doubt), "{:?}", found.doubts);
 }
 

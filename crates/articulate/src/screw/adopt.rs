@@ -28,18 +28,12 @@ pub fn adopt(evidence: &Evidence, tree: &mut KinematicTree, p: &Proposal, still:
     let m = Motion::from(place[p.source]);
     let crowd: Vec<Sample> = p.crowd.iter().map(|s| Sample { state: p.source, ..s.moved(&m) }).collect();
     for gate in [3.0, 1.5] {
-        polish(evidence, tree, &crowd, [gate * voxel, 0.0], n_states, seed);
+        polish(evidence, tree, &crowd, gate * voxel, n_states, seed);
         rescan(evidence, tree, &crowd, &place);
     }
-    gather(evidence, tree, &place, still, seed);
-}
-
-/// Refines the last joint and asks for its values again in turns, with everything that moves with it. `place`: its parent's poses.
-fn gather(evidence: &Evidence, tree: &mut KinematicTree, place: &[Pose], still: &[Verdict], seed: u64) {
-    let (child, voxel) = (tree.parts.len() - 1, evidence.lattice.voxel as f64);
     let moving: Vec<usize> = (0..still.len()).filter(|&i| still[i].against != 0).collect();
     for gate in [1.5, 1.0, 0.7] {
-        let mine = evidence.judge_some(&poses_of(tree, child, evidence.n_states()), &moving);
+        let mine = evidence.judge_some(&poses_of(tree, child, n_states), &moving);
         let explained = moving.iter().zip(&mine).filter(|(_, v)| v.explains());
         let mut members: Vec<Sample> = explained.map(|(&i, _)| evidence.samples[i]).collect();
         if members.len() < 20 {
@@ -47,50 +41,25 @@ fn gather(evidence: &Evidence, tree: &mut KinematicTree, place: &[Pose], still: 
         }
         fastrand::Rng::with_seed(seed).shuffle(&mut members);
         members.truncate(MEMBERS);
-        polish(evidence, tree, &members, [gate * voxel, 0.0], 4, seed);
-        rescan(evidence, tree, &members[..members.len().min(2 * CROWD)], place);
+        polish(evidence, tree, &members, gate * voxel, 4, seed);
+        rescan(evidence, tree, &members[..members.len().min(2 * CROWD)], &place);
         // Asking answers in steps of the grid.
-        polish(evidence, tree, &members, [gate * voxel, 0.0], 4, seed);
+        polish(evidence, tree, &members, gate * voxel, 4, seed);
     }
 }
 
-/// Voxels that a part may have slipped along its own faces.
-const SLIPPED: [f64; 3] = [8.0, 5.0, 3.0];
-
-/// Refines the last joint anew where part of what moves with it is carried into emptiness. `torn`: samples that some states confirm and
-/// some contradict.
-pub fn unslip(evidence: &Evidence, tree: &mut KinematicTree, torn: &[Sample], still: &[Verdict], seed: u64) {
-    let voxel = evidence.lattice.voxel as f64;
-    let parent = tree.joints.last().expect("a part was added").parent;
-    let place = poses_of(tree, parent, evidence.n_states());
-    let mut torn = torn.to_vec();
-    fastrand::Rng::with_seed(seed).shuffle(&mut torn);
-    torn.truncate(MEMBERS);
-    for reach in SLIPPED {
-        polish(evidence, tree, &torn, [1.5 * voxel, reach * voxel], evidence.n_states(), seed);
-    }
-    gather(evidence, tree, &place, still, seed);
-}
-
-/// Gauss-Newton on the last joint alone. `reach`: see [`refine::Settings`].
-fn polish(
-    evidence: &Evidence,
-    tree: &mut KinematicTree,
-    members: &[Sample],
-    [gate, reach]: [f64; 2],
-    partners: usize,
-    seed: u64,
-) {
+/// Gauss-Newton on the last joint alone.
+fn polish(evidence: &Evidence, tree: &mut KinematicTree, members: &[Sample], gate: f64, partners: usize, seed: u64) {
     let child = tree.parts.len() - 1;
     let mut free = vec![false; tree.joints.len()];
     free[child - 1] = true;
     let members: Vec<Member> = members.iter().map(|s| Member { sample: *s, part: child, shown: u64::MAX }).collect();
-    let settings = refine::Settings { gates: [gate, 0.5 * gate], rounds: 6, partners, reach };
+    let settings = refine::Settings { gates: [gate, 0.5 * gate], rounds: 6, partners };
     refine(evidence, tree, &members, &free, &settings, seed);
 }
 
 /// Another value must agree this much better with a state than the one that is held.
-const BETTER: f32 = 0.01;
+pub const BETTER: f32 = 0.01;
 
 /// Asks every state anew for the last joint's value.
 fn rescan(evidence: &Evidence, tree: &mut KinematicTree, members: &[Sample], place: &[Pose]) {

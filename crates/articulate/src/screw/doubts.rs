@@ -107,14 +107,14 @@ pub fn rival(
     seed: u64,
 ) -> (KinematicTree, f64) {
     let voxel = evidence.lattice.voxel as f64;
-    let settings = Settings { gates: [0.6 * voxel, 0.6 * voxel], rounds: 4, partners: 6, reach: 0.0 };
+    let settings = Settings { gates: [0.6 * voxel, 0.6 * voxel], rounds: 4, partners: 6 };
     let mut free = vec![false; tree.joints.len()];
     free[j] = true;
     let own = refine(evidence, &mut tree.clone(), members, &free, &settings, seed);
     let mut other = tree.clone();
     let kind = imitate(&mut other.joints[j], members);
     // The imitation is coarse: give it room to find its place.
-    let wide = Settings { gates: [2.0 * voxel, 0.6 * voxel], rounds: 8, partners: 6, reach: 0.0 };
+    let wide = Settings { gates: [2.0 * voxel, 0.6 * voxel], rounds: 8, partners: 6 };
     refine(evidence, &mut other, members, &free, &wide, seed);
     let theirs = refine(evidence, &mut other, members, &free, &settings, seed);
     // A hinge has two unknowns more than a slide.

@@ -1,8 +1,8 @@
 //! Finalists refined and judged.
 
-use super::adopt::{adopt, unslip};
+use super::adopt::adopt;
 use super::discover::{Node, poses_of};
-use super::evidence::{Evidence, Motion, Sample, Verdict};
+use super::evidence::{Evidence, Motion, Sample};
 use super::jury::Jury;
 use super::plausible::plausibility;
 use super::propose::{CROWD, Proposal};
@@ -17,8 +17,6 @@ pub struct Final {
     pub tree: KinematicTree,
     /// Open samples that it explains.
     pub explained: Vec<Sample>,
-    /// Open samples that some states confirm, and not more contradict.
-    torn: Vec<Sample>,
 }
 
 /// What a new part is added to, and judged by.
@@ -34,54 +32,31 @@ pub struct Ground<'a> {
 
 /// Faces within this angle of a new axis, or of square to it, say where it could point instead, radians; see [`along_faces`].
 const NEARLY: [f64; 3] = [0.3, 0.15, 0.04];
-/// One torn sample in so many that are explained may be chance.
-const TORN: usize = 50;
 
 impl Ground<'_> {
-    /// Refines a proposal, once more with its axis along its faces, and once more where it has slipped along them. The best of these.
+    /// Refines a proposal, and once more with its axis along its faces. The better of both.
     pub fn best(&self, p: &Proposal) -> Final {
         let found = self.finish(p);
         let straight = self.straight(p, &found).map(|p| self.finish(&p));
-        let found = straight.filter(|f| f.merit > found.merit).unwrap_or(found);
-        let back = self.unslipped(&found);
-        back.filter(|f| f.merit > found.merit).unwrap_or(found)
+        straight.filter(|f| f.merit > found.merit).unwrap_or(found)
     }
 
     fn finish(&self, p: &Proposal) -> Final {
-        let mut tree = self.node.tree.clone();
-        adopt(self.evidence, &mut tree, p, &self.node.verdicts[p.parent], self.seed);
-        self.judged(tree)
-    }
-
-    fn unslipped(&self, found: &Final) -> Option<Final> {
-        if found.torn.len() * TORN < found.explained.len() || found.merit < 0.0 {
-            return None;
-        }
-        let mut tree = found.tree.clone();
-        let parent = tree.joints.last().expect("a part was added").parent;
-        unslip(self.evidence, &mut tree, &found.torn, &self.node.verdicts[parent], self.seed);
-        Some(self.judged(tree))
-    }
-
-    /// What the last joint of a tree is worth.
-    fn judged(&self, tree: KinematicTree) -> Final {
         let (evidence, node) = (self.evidence, self.node);
+        let mut tree = node.tree.clone();
+        adopt(evidence, &mut tree, p, &node.verdicts[p.parent], self.seed);
         let own = poses_of(&tree, tree.parts.len() - 1, evidence.n_states());
-        let parent = tree.joints.last().expect("a part was added").parent;
         // What it explains now, not what proposed it: refining may have found another piece.
         let verdicts = evidence.judge_some(&own, &node.open);
-        let those = |which: &dyn Fn(&Verdict) -> bool| -> Vec<Sample> {
-            node.open.iter().zip(&verdicts).filter(|(_, v)| which(v)).map(|(&i, _)| evidence.samples[i]).collect()
-        };
-        let explained = those(&Verdict::explains);
-        let torn = those(&|v| v.against != 0 && v.support.count_ones() >= v.against.count_ones());
-        let back: Vec<Motion> = self.poses[parent].iter().map(|p| p.inverse().into()).collect();
+        let explained = node.open.iter().zip(&verdicts).filter(|(_, v)| v.explains());
+        let explained: Vec<Sample> = explained.map(|(&i, _)| evidence.samples[i]).collect();
+        let back: Vec<Motion> = self.poses[p.parent].iter().map(|p| p.inverse().into()).collect();
         let stride = explained.len().div_ceil(CROWD).max(1);
         let crowd: Vec<Sample> = explained.iter().step_by(stride).map(|s| s.moved(&back[s.state])).collect();
         let joint = tree.joints.last().expect("a part was added");
         let weight = plausibility(&joint.screw, &joint.values, joint.parent, &crowd, evidence.extent());
         let merit = self.jury.gain(evidence, &own, true) * weight - self.cost;
-        Final { merit, tree, explained, torn }
+        Final { merit, tree, explained }
     }
 
     /// The proposal that `found` was, with the axis that it ended at turned to where the faces say, if that is somewhere else: the

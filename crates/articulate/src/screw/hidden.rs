@@ -2,9 +2,9 @@
 //!
 //! Asked for the value there, the states answer all the same: the front of the rack fits the inside of any board. What tells is surface
 //! that no other part explains. Where nearly none of it is the part's, the states are asked once more with that surface alone, and
-//! where that finds nothing, the value is that of the nearest state that shows the part, which holds whatever nobody touched.
+//! where that finds nothing, the value is that of the nearest state that shows the part, where nothing of it would be seen.
 
-use super::adopt::{in_parent, rescanned};
+use super::adopt::{BETTER, in_parent, rescanned};
 use super::discover::poses_of;
 use super::evidence::{Evidence, Sample, Verdict};
 use super::scan::{Worth, agreement};
@@ -15,22 +15,25 @@ use hingecast_geom::{KinematicTree, Pose};
 const WEAK: f64 = 0.1;
 /// Share of a part's samples that must meet surface of its own where it is shown.
 const SEEN: f32 = 0.02;
-/// Another value must agree this much better than the one that is held.
-const BETTER: f32 = 0.01;
+/// Where a part is hidden, fewer of its samples than this enter space that was seen empty.
+const ENTERED: f32 = 0.05;
+/// ... and fewer than this lie near any surface that faces alike: boards of what hides it.
+const NEAR: f32 = 0.3;
 /// Surface that another part explains, or could explain, says nothing.
 const OWN: Worth = Worth { explained: 0.0, possible: 0.0 };
+const ANY: Worth = Worth { explained: 1.0, possible: 1.0 };
 
-/// Of every part, the states that show it, one bit each. Corrects values: those that only surface of other parts spoke for, and those
-/// in states that do not show the part.
-pub fn shown(
+/// Of every joint, the states that do not show its part, each with the nearest state whose value may hold there as well. Corrects values:
+/// those that only surface of other parts spoke for, and those of hidden parts.
+pub fn hidden(
     evidence: &mut Evidence,
     tree: &mut KinematicTree,
     labels: &[u8],
     verdicts: &[Vec<Verdict>],
     seed: u64,
-) -> Vec<u64> {
+) -> Vec<Vec<(usize, usize)>> {
     let n_states = evidence.n_states();
-    let mut shown = vec![u64::MAX; tree.parts.len()];
+    let mut hidden = vec![Vec::new(); tree.joints.len()];
     for j in 0..tree.joints.len() {
         let (child, parent) = (tree.joints[j].child, tree.joints[j].parent);
         let mine: Vec<usize> = (0..labels.len()).filter(|&i| labels[i] as usize == child).collect();
@@ -54,30 +57,48 @@ pub fn shown(
         let joint = &mut tree.joints[j];
         let samples = in_parent(joint, &asking, &poses[parent]);
         let found = rescanned(evidence, joint, &samples, &poses[parent], OWN);
+        let mut strong: Vec<usize> = (0..n_states).filter(|t| !weak.contains(t)).collect();
         for &t in &weak {
-            let at = |q: f64| agreement(evidence, t, &samples, &(poses[parent][t] * joint.screw.motion(q)).into(), OWN);
+            let asked = |q: f64, worth: Worth| {
+                agreement(evidence, t, &samples, &(poses[parent][t] * joint.screw.motion(q)).into(), worth)
+            };
+            let at = |q: f64| asked(q, OWN);
+            strong.sort_by_key(|s| s.abs_diff(t));
+            let unseen = |s: &&usize| {
+                let q = joint.values[**s];
+                at(q) > -ENTERED && asked(q, ANY) < NEAR
+            };
+            let Some(&stands) = strong.iter().find(unseen) else {
+                // It is seen: another part explains what this one shows as well.
+                continue;
+            };
             let held = at(joint.values[t]);
             if found.scores[t] > held + BETTER {
                 joint.values[t] = found.values[t];
             }
+            eprintln!(
+                "H joint {j} t {t} held {held:.3} found {:.3} {:?}",
+                found.scores[t],
+                strong.iter().map(|s| (at(joint.values[*s]), asked(joint.values[*s], ANY))).collect::<Vec<_>>()
+            );
             if found.scores[t].max(held) < SEEN {
-                shown[child] &= !(1 << t);
+                hidden[j].push((t, stands));
             }
         }
+        // How it moved takes two states at least.
+        if n_states - hidden[j].len() < 2 {
+            hidden[j].clear();
+        }
     }
-    hold(tree, &shown);
-    shown
+    hold(tree, &hidden);
+    hidden
 }
 
-/// What a state does not show stays where the nearest state that shows it has it.
-pub fn hold(tree: &mut KinematicTree, shown: &[u64]) {
-    for joint in &mut tree.joints {
-        let shows = |t: &usize| shown[joint.child] >> t & 1 == 1;
-        let states = 0..joint.values.len();
-        for t in states.clone().filter(|t| !shows(t)) {
-            if let Some(nearest) = states.clone().filter(shows).min_by_key(|s| s.abs_diff(t)) {
-                joint.values[t] = joint.values[nearest];
-            }
+/// What a state does not show stands where the other has it.
+pub fn hold(tree: &mut KinematicTree, hidden: &[Vec<(usize, usize)>]) {
+    for (joint, hidden) in tree.joints.iter_mut().zip(hidden) {
+        for &(state, as_in) in hidden {
+            joint.values[state] = joint.values[as_in];
         }
     }
 }

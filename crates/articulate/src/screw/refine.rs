@@ -5,7 +5,6 @@
 //! P_k(t) into exp(xi_t) P_k(t), with the twist xi in the world frame, so dr = n . (xi_t(M x) - R_M xi_a(x)).
 
 use super::evidence::{Evidence, Motion, Sample};
-use super::space::FREE;
 use super::twist::{Twist, square, twists};
 use glam::{DMat3, DVec3};
 use hingecast_geom::pose::quat_from_rotation_vector;
@@ -29,8 +28,6 @@ pub struct Settings {
     pub rounds: usize,
     /// Other states that each sample is compared with per round.
     pub partners: usize,
-    /// What enters emptiness is pulled to the nearest surface that faces alike, if that is no farther; scene units.
-    pub reach: f64,
 }
 
 /// What the last round knew.
@@ -106,8 +103,7 @@ pub fn refine(
     for round in 0..settings.rounds {
         let share = round as f64 / (settings.rounds - 1).max(1) as f64;
         let gate = settings.gates[0] * (settings.gates[1] / settings.gates[0]).powf(share);
-        let (partners, reach) = (settings.partners, settings.reach);
-        let ask = Ask { evidence, members, slots: &slots, size, gate, partners, reach, seed, round };
+        let ask = Ask { evidence, members, slots: &slots, size, gate, partners: settings.partners, seed, round };
         let sums = ask.all(tree);
         report.cost = sums.cost;
         report.rms = sums.squares.sqrt();
@@ -139,7 +135,7 @@ pub fn cost(
     seed: u64,
 ) -> f64 {
     let slots = vec![None; tree.joints.len()];
-    Ask { evidence, members, slots: &slots, size: 0, gate, partners, reach: 0.0, seed, round: 0 }.all(tree).cost
+    Ask { evidence, members, slots: &slots, size: 0, gate, partners, seed, round: 0 }.all(tree).cost
 }
 
 /// One round's question: the same members meet the same states, however often it is asked.
@@ -151,7 +147,6 @@ struct Ask<'a> {
     size: usize,
     gate: f64,
     partners: usize,
-    reach: f64,
     seed: u64,
     round: usize,
 }
@@ -255,14 +250,11 @@ impl Ask<'_> {
                 }
                 let m = poses[t][*part] * back;
                 out.asked += 1;
-                let met = residual(self.evidence, sample, t, &m, gate);
-                let Some((r, n, x)) = met.or_else(|| self.astray(sample, t, &m)) else {
+                let Some((r, n, x)) = residual(self.evidence, sample, t, &m, gate) else {
                     out.cost += 1.0;
                     continue;
                 };
-                // Geman and McClure: what lies far off hardly pulls.
-                let w = if met.is_some() { (1.0 + (2.0 * r / gate).powi(2)).powi(-2) } else { ASTRAY };
-                out.cost += if met.is_some() { (r / gate).powi(2) } else { 1.0 + ASTRAY * (r / self.reach).powi(2) };
+                out.cost += (r / gate).powi(2);
                 row.clear();
                 let rotated = m.rot.conjugate() * n;
                 for &j in &chains[*part] {
@@ -281,6 +273,8 @@ impl Ask<'_> {
                         row.push((slot.values + sample.state - 1, -g));
                     }
                 }
+                // Geman and McClure: what lies far off hardly pulls.
+                let w = (1.0 + (2.0 * r / gate).powi(2)).powi(-2);
                 for &(i, gi) in &row {
                     out.b[i] -= w * gi * r;
                     for &(k, gk) in &row {
@@ -297,34 +291,6 @@ impl Ask<'_> {
     }
 }
 
-/// Pull on what entered emptiness, against 1 on what lies on its surface.
-const ASTRAY: f64 = 0.1;
-/// Nearest samples among which one that faces alike is sought.
-const NEAREST: usize = 16;
-
-impl Ask<'_> {
-    /// For a point that enters emptiness: the distance to the nearest surface that faces alike, the direction from there, and the carried
-    /// point. A door that is carried too far along its own plane overlaps itself, and nothing but what sticks out knows.
-    fn astray(&self, s: &Sample, t: usize, m: &Pose) -> Option<(f64, DVec3, DVec3)> {
-        if self.reach == 0.0 {
-            return None;
-        }
-        let x = m.apply(s.point.as_dvec3());
-        let (at, normal) = (x.as_vec3(), Motion::from(*m).rot * s.normal);
-        if self.evidence.spaces[t].bits(at) & FREE == 0 {
-            return None;
-        }
-        let cloud = &self.evidence.clouds[t];
-        let near = cloud.k_nearest(at, NEAREST).into_iter().map(|i| i as usize);
-        let y = near.filter(|&i| cloud.normals[i].dot(normal) > ALIKE).map(|i| cloud.points[i].as_dvec3()).next()?;
-        let r = x.distance(y);
-        (r < self.reach).then(|| (r, (x - y) / r, x))
-    }
-}
-
-/// Cosine between normals that face alike.
-const ALIKE: f32 = 0.85;
-
 /// Distance to the plane found at state t, its normal, and the carried point.
 fn residual(evidence: &Evidence, s: &Sample, t: usize, m: &Pose, gate: f64) -> Option<(f64, DVec3, DVec3)> {
     let x = m.apply(s.point.as_dvec3());
@@ -333,7 +299,7 @@ fn residual(evidence: &Evidence, s: &Sample, t: usize, m: &Pose, gate: f64) -> O
     let (i, squared) = cloud.nearest(x.as_vec3())?;
     let n = cloud.normals[i];
     let reach = (gate as f32).max(1.2 * evidence.lattice.voxel);
-    if squared > reach * reach || n.dot(normal) < ALIKE {
+    if squared > reach * reach || n.dot(normal) < 0.85 {
         return None;
     }
     // The bisecting normal is right to second order on curved surfaces.

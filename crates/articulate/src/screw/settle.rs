@@ -69,9 +69,13 @@ pub fn settle(evidence: &mut Evidence, found: &Discovery, seed: u64) -> Settled 
         verdicts = prune(evidence, &mut tree, found.cost);
     }
     labels = label(evidence, &verdicts);
-    let shown = hidden::shown(evidence, &mut tree, &labels, &verdicts, seed);
-    if shown.iter().any(|states| *states != u64::MAX) {
+    let hidden = hidden::hidden(evidence, &mut tree, &labels, &verdicts, seed);
+    if hidden.iter().any(|states| !states.is_empty()) {
         labels = label(evidence, &judge_all(evidence, &tree));
+    }
+    let mut shown = vec![u64::MAX; tree.parts.len()];
+    for (joint, states) in tree.joints.iter().zip(&hidden) {
+        states.iter().for_each(|(t, _)| shown[joint.child] &= !(1 << t));
     }
     let mut owners = Owners { labels, shown };
     slides(evidence, &mut tree, &owners, seed);
@@ -93,10 +97,10 @@ pub fn settle(evidence: &mut Evidence, found: &Discovery, seed: u64) -> Settled 
         };
         let members: Vec<Member> = evidence.samples.iter().zip(&owners.labels).filter_map(member).collect();
         let gate = if round == 0 { 1.0 } else { 0.6 } * voxel;
-        let settings = Settings { gates: [gate, 0.5 * gate], rounds: 6, partners: 6, reach: 0.0 };
+        let settings = Settings { gates: [gate, 0.5 * gate], rounds: 6, partners: 6 };
         report = refine(evidence, &mut tree, &members, &free, &settings, seed ^ round);
         straighten(evidence, &mut tree, &owners, seed);
-        hidden::hold(&mut tree, &owners.shown);
+        hidden::hold(&mut tree, &hidden);
         verdicts = judge_all(evidence, &tree);
         owners.labels = label(evidence, &verdicts);
     }

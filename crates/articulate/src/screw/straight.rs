@@ -30,7 +30,7 @@ pub const ASKEW: f64 = 0.01;
 /// explain the recording a little worse: two unknowns less are worth their share of evidence.
 pub fn straighten(evidence: &Evidence, tree: &mut KinematicTree, owners: &Owners, seed: u64) {
     let voxel = evidence.lattice.voxel as f64;
-    let fit = Settings { gates: [1.0 * voxel, 0.6 * voxel], rounds: 4, partners: 6, reach: 0.0 };
+    let fit = Settings { gates: [1.0 * voxel, 0.6 * voxel], rounds: 4, partners: 6 };
     for j in 0..tree.joints.len() {
         let (child, screw) = (tree.joints[j].child, tree.joints[j].screw);
         let own = owners.members(evidence, child);
