@@ -76,11 +76,6 @@ pub fn hidden(
             if found.scores[t] > held + BETTER {
                 joint.values[t] = found.values[t];
             }
-            eprintln!(
-                "H joint {j} t {t} held {held:.3} found {:.3} {:?}",
-                found.scores[t],
-                strong.iter().map(|s| (at(joint.values[*s]), asked(joint.values[*s], ANY))).collect::<Vec<_>>()
-            );
             if found.scores[t].max(held) < SEEN {
                 hidden[j].push((t, stands));
             }
