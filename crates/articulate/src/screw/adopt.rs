@@ -59,7 +59,7 @@ fn polish(evidence: &Evidence, tree: &mut KinematicTree, members: &[Sample], gat
 }
 
 /// Another value must agree this much better with a state than the one that is held.
-pub const BETTER: f32 = 0.01;
+const BETTER: f32 = 0.01;
 
 /// Asks every state anew for the last joint's value.
 fn rescan(evidence: &Evidence, tree: &mut KinematicTree, members: &[Sample], place: &[Pose]) {

@@ -4,7 +4,7 @@
 //! that no other part explains. Where nearly none of it is the part's, the states are asked once more with that surface alone, and
 //! where that finds nothing, the value is that of the nearest state that shows the part, where nothing of it would be seen.
 
-use super::adopt::{BETTER, in_parent, rescanned};
+use super::adopt::{in_parent, rescanned};
 use super::discover::poses_of;
 use super::evidence::{Evidence, Sample, Verdict};
 use super::scan::{Worth, agreement};
@@ -72,11 +72,12 @@ pub fn hidden(
                 // It is seen: another part explains what this one shows as well.
                 continue;
             };
-            let held = at(joint.values[t]);
-            if found.scores[t] > held + BETTER {
-                joint.values[t] = found.values[t];
+            if at(joint.values[t]) >= SEEN {
+                continue;
             }
-            if found.scores[t].max(held) < SEEN {
+            if found.scores[t] >= SEEN {
+                joint.values[t] = found.values[t];
+            } else {
                 hidden[j].push((t, stands));
             }
         }
