@@ -72,18 +72,25 @@ fn cuboid(lo: [f64; 3], hi: [f64; 3]) -> (DVec3, DVec3) {
     (lo.into(), hi.into())
 }
 
+/// A case from x = `front` to 0.5, open in front; y from -`half` to `half`, z from -0.3 to 0.4.
+fn case(front: f64, half: f64) -> Boxes {
+    let (outer, inner) = (half, half - 0.04);
+    vec![
+        cuboid([front, -outer, -0.3], [0.5, outer, -0.26]),
+        cuboid([front, -outer, 0.36], [0.5, outer, 0.4]),
+        cuboid([front, -outer, -0.26], [0.5, -inner, 0.36]),
+        cuboid([front, inner, -0.26], [0.5, outer, 0.36]),
+        cuboid([0.46, -inner, -0.26], [0.5, inner, 0.36]),
+    ]
+}
+
 /// A case with a door (with a handle) on the left and a drawer on the right.
 fn cupboard() -> Vec<Boxes> {
+    let mut carcass = case(-0.3, 0.7);
+    carcass.push(cuboid([-0.3, -0.02, -0.26], [0.46, 0.02, 0.36]));
+    carcass.push(cuboid([-0.35, 0.01, 0.16], [-0.3, 0.7, 0.4]));
     vec![
-        vec![
-            cuboid([-0.3, -0.7, -0.3], [0.5, 0.7, -0.26]),
-            cuboid([-0.3, -0.7, 0.36], [0.5, 0.7, 0.4]),
-            cuboid([-0.3, -0.7, -0.26], [0.5, -0.66, 0.36]),
-            cuboid([-0.3, 0.66, -0.26], [0.5, 0.7, 0.36]),
-            cuboid([0.46, -0.66, -0.26], [0.5, 0.66, 0.36]),
-            cuboid([-0.3, -0.02, -0.26], [0.46, 0.02, 0.36]),
-            cuboid([-0.35, 0.01, 0.16], [-0.3, 0.7, 0.4]),
-        ],
+        carcass,
         vec![cuboid([-0.35, -0.7, -0.3], [-0.3, -0.01, 0.4]), cuboid([-0.42, -0.12, 0.0], [-0.35, -0.08, 0.15])],
         vec![
             cuboid([-0.35, 0.01, -0.3], [-0.3, 0.7, 0.15]),
@@ -267,13 +274,7 @@ fn equal_drawers_one_after_another() {
 #[test]
 fn a_drawer_behind_a_door() {
     let boxes = vec![
-        vec![
-            cuboid([-0.2, -0.4, -0.3], [0.5, 0.4, -0.26]),
-            cuboid([-0.2, -0.4, 0.36], [0.5, 0.4, 0.4]),
-            cuboid([-0.2, -0.4, -0.26], [0.5, -0.36, 0.36]),
-            cuboid([-0.2, 0.36, -0.26], [0.5, 0.4, 0.36]),
-            cuboid([0.46, -0.36, -0.26], [0.5, 0.36, 0.36]),
-        ],
+        case(-0.2, 0.4),
         vec![cuboid([-0.26, -0.4, -0.3], [-0.21, 0.3, 0.4]), cuboid([-0.33, 0.18, 0.0], [-0.26, 0.22, 0.15])],
         vec![
             cuboid([-0.14, -0.3, -0.2], [-0.1, 0.3, 0.1]),

@@ -5,11 +5,10 @@
 //! where that finds nothing, the value is that of the nearest state that shows the part, where nothing of it would be seen.
 
 use super::adopt::{in_parent, rescanned};
-use super::discover::poses_of;
-use super::evidence::{Evidence, Sample, Verdict};
+use super::evidence::{Evidence, Verdict};
 use super::scan::{Worth, agreement};
-use super::settle::ASKING;
-use hingecast_geom::{KinematicTree, Pose};
+use super::settle::{mark_others, some};
+use hingecast_geom::KinematicTree;
 
 /// A state with less than this share of the surface of its own that a part has in the state that shows most of it may not show it.
 const WEAK: f64 = 0.1;
@@ -35,7 +34,7 @@ pub fn hidden(
     let n_states = evidence.n_states();
     let mut hidden = vec![Vec::new(); tree.joints.len()];
     for j in 0..tree.joints.len() {
-        let (child, parent) = (tree.joints[j].child, tree.joints[j].parent);
+        let child = tree.joints[j].child;
         let mine: Vec<usize> = (0..labels.len()).filter(|&i| labels[i] as usize == child).collect();
         let mut own = vec![0usize; n_states];
         for &i in &mine {
@@ -47,20 +46,16 @@ pub fn hidden(
         if weak.is_empty() {
             continue;
         }
-        let poses: Vec<Vec<Pose>> = (0..tree.parts.len()).map(|p| poses_of(tree, p, n_states)).collect();
-        let others: Vec<Vec<Pose>> = (0..poses.len()).filter(|p| *p != child).map(|p| poses[p].clone()).collect();
-        evidence.mark_taken(&others);
-        let mut asking: Vec<Sample> =
-            mine.iter().map(|&i| evidence.samples[i]).filter(|s| !weak.contains(&s.state)).collect();
-        fastrand::Rng::with_seed(seed ^ j as u64).shuffle(&mut asking);
-        asking.truncate(ASKING);
+        let place = mark_others(evidence, tree, j);
+        let strongly = mine.iter().map(|&i| evidence.samples[i]).filter(|s| !weak.contains(&s.state));
+        let asking = some(strongly, seed ^ j as u64);
         let joint = &mut tree.joints[j];
-        let samples = in_parent(joint, &asking, &poses[parent]);
-        let found = rescanned(evidence, joint, &samples, &poses[parent], OWN);
+        let samples = in_parent(joint, &asking, &place);
+        let found = rescanned(evidence, joint, &samples, &place, OWN);
         let mut strong: Vec<usize> = (0..n_states).filter(|t| !weak.contains(t)).collect();
         for &t in &weak {
             let asked = |q: f64, worth: Worth| {
-                agreement(evidence, t, &samples, &(poses[parent][t] * joint.screw.motion(q)).into(), worth)
+                agreement(evidence, t, &samples, &(place[t] * joint.screw.motion(q)).into(), worth)
             };
             let at = |q: f64| asked(q, OWN);
             strong.sort_by_key(|s| s.abs_diff(t));

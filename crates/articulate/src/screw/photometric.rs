@@ -127,10 +127,6 @@ pub fn refine(
         }
     }
     let first = guess.tree.poses_at(0);
-    // Values count from the first state again, and screws are where they were then.
-    for joint in &mut guess.tree.joints {
-        joint.screw = joint.screw.transformed(&first[joint.parent]);
-    }
     tidy(&mut guess.tree);
     Ok(Refined { tree: guess.tree, first, rig: guess.rig, cost: [before, sums.cost] })
 }

@@ -27,10 +27,14 @@ pub struct Owners {
 impl Owners {
     /// Samples of a part, from states that show it.
     pub fn members(&self, evidence: &Evidence, part: usize) -> Vec<Member> {
-        let shown = self.shown[part];
-        let own = |(s, l): &(&Sample, &u8)| **l as usize == part && shown >> s.state & 1 == 1;
-        let samples = evidence.samples.iter().zip(&self.labels).filter(own);
-        samples.map(|(s, _)| Member { sample: *s, part, shown }).collect()
+        self.all(evidence).filter(|m| m.part == part).collect()
+    }
+
+    /// Samples of all parts, from states that show these.
+    fn all<'a>(&'a self, evidence: &'a Evidence) -> impl Iterator<Item = Member> + 'a {
+        let member = |(s, l): (&Sample, &u8)| Member { sample: *s, part: *l as usize, shown: self.shown[*l as usize] };
+        let members = evidence.samples.iter().zip(&self.labels).map(member);
+        members.filter(|m| m.shown >> m.sample.state & 1 == 1)
     }
 }
 
@@ -91,11 +95,7 @@ pub fn settle(evidence: &mut Evidence, found: &Discovery, seed: u64) -> Settled 
             }
             evidence.transform(&moved);
         }
-        let member = |(s, l): (&Sample, &u8)| {
-            let (part, shown) = (*l as usize, owners.shown[*l as usize]);
-            (part != 0 && shown >> s.state & 1 == 1).then_some(Member { sample: *s, part, shown })
-        };
-        let members: Vec<Member> = evidence.samples.iter().zip(&owners.labels).filter_map(member).collect();
+        let members: Vec<Member> = owners.all(evidence).filter(|m| m.part != 0).collect();
         let gate = if round == 0 { 1.0 } else { 0.6 } * voxel;
         let settings = Settings { gates: [gate, 0.5 * gate], rounds: 6, partners: 6 };
         report = refine(evidence, &mut tree, &members, &free, &settings, seed ^ round);
@@ -117,21 +117,31 @@ fn judge_all(evidence: &Evidence, tree: &KinematicTree) -> Vec<Vec<Verdict>> {
 
 /// Asks all states for the value of every joint once more, now that all parts are known.
 fn ask_again(evidence: &mut Evidence, tree: &mut KinematicTree, labels: &[u8], seed: u64) {
-    let n_states = evidence.n_states();
     for j in 0..tree.joints.len() {
-        let poses: Vec<Vec<Pose>> = (0..tree.parts.len()).map(|p| poses_of(tree, p, n_states)).collect();
-        let (child, parent) = (tree.joints[j].child, tree.joints[j].parent);
-        // What the other parts explain must not hold this one.
-        let others: Vec<Vec<Pose>> = (0..poses.len()).filter(|p| *p != child).map(|p| poses[p].clone()).collect();
-        evidence.mark_taken(&others);
+        let child = tree.joints[j].child;
+        let place = mark_others(evidence, tree, j);
         let own = evidence.samples.iter().zip(labels).filter(|(_, l)| **l as usize == child);
-        let mut asking: Vec<Sample> = own.map(|(s, _)| *s).collect();
-        fastrand::Rng::with_seed(seed ^ j as u64).shuffle(&mut asking);
-        asking.truncate(ASKING);
+        let asking = some(own.map(|(s, _)| *s), seed ^ j as u64);
         if !asking.is_empty() {
-            tree.joints[j].values = asked_again(evidence, &tree.joints[j], &asking, &poses[parent]);
+            tree.joints[j].values = asked_again(evidence, &tree.joints[j], &asking, &place);
         }
     }
+}
+
+/// Marks what parts other than the child of joint `j` explain: it must not hold that child. Answers the poses of its parent.
+pub fn mark_others(evidence: &mut Evidence, tree: &KinematicTree, j: usize) -> Vec<Pose> {
+    let (child, n_states) = (tree.joints[j].child, evidence.n_states());
+    let others = (0..tree.parts.len()).filter(|p| *p != child);
+    evidence.mark_taken(&others.map(|p| poses_of(tree, p, n_states)).collect::<Vec<_>>());
+    poses_of(tree, tree.joints[j].parent, n_states)
+}
+
+/// Some of the samples of a part, to ask for its value.
+pub fn some(own: impl Iterator<Item = Sample>, seed: u64) -> Vec<Sample> {
+    let mut asking: Vec<Sample> = own.collect();
+    fastrand::Rng::with_seed(seed).shuffle(&mut asking);
+    asking.truncate(ASKING);
+    asking
 }
 
 /// A hinge this many extents away from the object may be a slide.
@@ -239,8 +249,7 @@ pub fn tidy(tree: &mut KinematicTree) {
             let moved = screw.motion(zero);
             let hangs = |k: &usize| tree.ancestry(tree.joints[*k].parent).contains(&j);
             for k in (0..tree.joints.len()).filter(hangs).collect::<Vec<_>>() {
-                let below = &mut tree.joints[k].screw;
-                (below.axis, below.pivot) = (moved.rotate(below.axis), moved.apply(below.pivot));
+                tree.joints[k].screw = tree.joints[k].screw.transformed(&moved);
             }
         }
         let joint = &mut tree.joints[j];
