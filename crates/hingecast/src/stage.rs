@@ -10,7 +10,7 @@ use serde::{Deserialize, Serialize};
 use std::path::{Path, PathBuf};
 
 /// Grows when the meaning of files in a run changes.
-const FORMAT: u32 = 7;
+const FORMAT: u32 = 8;
 
 /// Name, time and memory of one finished stage.
 #[derive(Clone, Debug, Serialize, Deserialize)]

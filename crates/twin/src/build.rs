@@ -1,8 +1,10 @@
 //! The stage: observations and tree in, [`Twin`] out.
 
-use crate::fuse::{self, Field};
-use crate::slabs::Slabs;
-use crate::{Inertial, Observation, PartModel, Twin, clearance, color, hulls, mass, separate, simplify, surface};
+use crate::field::Field;
+use crate::{
+    Inertial, Observation, PartModel, Twin, clearance, color, fuse, hulls, mass, separate, simplify, snap, solid,
+    surface,
+};
 use glam::{DMat3, DVec3, Vec3};
 use hingecast_geom::{Cancelled, KinematicTree, Pose, Progress, TriMesh};
 use rayon::prelude::*;
@@ -28,6 +30,9 @@ pub struct Config {
     pub color_views: usize,
 }
 
+/// At most this many images say where the surface is exactly, and a pixel speaks for what lies within this many voxels of its plane.
+const SNAP_VIEWS: usize = 480;
+const SNAP_REACH: f32 = 1.5;
 /// Share of the collision volume that may be cut away without a word.
 const LOST: f64 = 0.02;
 
@@ -51,7 +56,7 @@ pub struct Input<'a> {
     pub tree: &'a KinematicTree,
     /// States of the recording: a tree without joints does not tell.
     pub n_states: usize,
-    /// Number of observations; `load(i)` is called up to three times for each.
+    /// Number of observations; `load(i)` is called up to four times for each.
     pub n_observations: usize,
     /// Diagonal of the object's box in the first state, scene units.
     pub diagonal: f64,
@@ -74,58 +79,42 @@ pub fn build<E: From<Cancelled> + Send>(
     let voxel = (config.voxel * input.diagonal) as f32;
     let volumes = fuse::fuse(input.n_observations, load, &poses, voxel, progress)?;
 
-    // Leaves first: what a drawer fills is not the cabinet's, where no ray can tell.
-    let mut order: Vec<usize> = (0..tree.parts.len()).collect();
-    order.sort_by_key(|&p| std::cmp::Reverse(tree.ancestry(p).len()));
-    let mut fields: Vec<Option<(Field, Slabs)>> = (0..tree.parts.len()).map(|_| None).collect();
-    // A part also empties what it passes through between the states, in the parts that carry it.
-    let swept: Vec<Vec<Pose>> = poses.iter().cloned().chain(sweeps(tree, BETWEEN)).collect();
-    let carried = |part: usize, by: usize| tree.ancestry(part).iter().any(|&j| tree.joints[j].parent == by);
-    for &part in &order {
-        let Some(volume) = &volumes[part] else { continue };
-        let relative: Vec<(usize, Vec<Pose>)> = (0..fields.len())
-            .filter(|&q| fields[q].is_some())
-            .map(|q| (q, if carried(q, part) { &swept } else { &poses }))
-            .map(|(q, path)| (q, path.iter().map(|at| at[q].inverse() * at[part]).collect()))
-            .collect();
-        // Far from what is seen of this part, the hollow of the other is empty as well: nothing of a cabinet is in its drawer.
-        let taken = |x: Vec3, deep: bool| {
-            relative.iter().any(|(q, q_from_part)| {
-                let (field, hull) = fields[*q].as_ref().expect("filtered");
-                q_from_part.iter().any(|pose| {
-                    let x = pose.apply(x.as_dvec3()).as_vec3();
-                    field.at(x) < 0.0 || deep && hull.hold(x)
-                })
-            })
-        };
-        let field = volume.field(&taken, tree.joint_of(part).is_some());
-        let hull = field.hull();
-        fields[part] = Some((field, hull));
-    }
-    let fields: Vec<Option<Field>> = fields.into_iter().map(|f| Some(f?.0)).collect();
+    let order = solid::leaves_first(tree);
+    let fields = solid::fields(&volumes, tree, &poses);
     progress.check()?;
 
-    let mut doubts = Vec::new();
-    let mesh_of = |field: &Field| {
-        let fine = surface::drop_crumbs(&surface::extract(field), config.crumbs, &|x| field.firm_near(x));
-        simplify::simplify(&fine, config.max_faces, (config.simplify_error * input.diagonal) as f32)
+    let shown = |most: usize, visit: &mut dyn FnMut(&[Observation])| -> Result<(), E> {
+        let n = input.n_observations;
+        let used = n.min(most.max(1));
+        for batch in (0..used).map(|k| k * n / used).collect::<Vec<_>>().chunks(32) {
+            progress.check()?;
+            visit(&batch.par_iter().map(|&i| load(i)).collect::<Result<Vec<_>, E>>()?);
+        }
+        Ok(())
     };
-    let mut meshes: Vec<TriMesh> =
-        fields.par_iter().map(|f| f.as_ref().map_or_else(TriMesh::default, mesh_of)).collect();
+    let mut doubts = Vec::new();
+    let fine = |field: &Field| surface::drop_crumbs(&surface::extract(field), config.crumbs, &|x| field.firm_near(x));
+    let simple =
+        |fine: &TriMesh| simplify::simplify(fine, config.max_faces, (config.simplify_error * input.diagonal) as f32);
+    let mut meshes: Vec<TriMesh> = fields.par_iter().map(|f| f.as_ref().map_or_else(TriMesh::default, fine)).collect();
+    // For mass and collision, where a sheet should stay as thick as the grid makes it.
+    let thick: Vec<TriMesh> = meshes.par_iter().map(simple).collect();
+    snap(&mut meshes, &poses, voxel, &shown)?;
+    meshes = meshes.par_iter().map(simple).collect();
     // Root first, then along the tree: every part keeps clear of those before it, also between recorded states.
-    let path: Vec<Vec<Pose>> = poses.iter().cloned().chain(sweeps(tree, CLEARED)).collect();
+    let path: Vec<Vec<Pose>> = poses.iter().cloned().chain(solid::sweeps(tree, CLEARED)).collect();
     let collision: Vec<TriMesh> = (0..fields.len())
         .into_par_iter()
         .map(|part| {
             let before = order.iter().rev().take_while(|&&q| q != part).copied().collect::<Vec<_>>();
             if before.is_empty() {
-                return meshes[part].clone();
+                return thick[part].clone();
             }
-            clearance::trim(part, &fields, &before, &path).map_or_else(TriMesh::default, |f| mesh_of(&f))
+            clearance::trim(part, &fields, &before, &path).map_or_else(TriMesh::default, |f| simple(&fine(&f)))
         })
         .collect();
     drop(fields);
-    colour(&mut meshes, input, load, &poses, config, voxel, progress)?;
+    colour(&mut meshes, &poses, voxel, config.color_views, &shown)?;
 
     let hull_config = hulls::HullConfig { max_hulls: config.max_hulls, ..Default::default() };
     let decomposed: Vec<(Vec<TriMesh>, usize)> =
@@ -158,7 +147,7 @@ pub fn build<E: From<Cancelled> + Send>(
         let (inertial, doubt) = if mesh.is_empty() {
             (Inertial { mass: 1e-3, com: DVec3::ZERO, inertia: DMat3::IDENTITY * 1e-6 }, None)
         } else {
-            mass::inertial(&mesh, &hulls, config.density)
+            mass::inertial(&thick[part], &hulls, config.density)
         };
         if let Some(doubt) = doubt {
             doubts.push(format!("part '{name}': {doubt}"));
@@ -177,51 +166,47 @@ pub fn build<E: From<Cancelled> + Send>(
     })
 }
 
-/// Steps over a joint's range in which a part empties what it passes through: the back of a drawer is a thin board.
-const BETWEEN: usize = 120;
 /// Steps over a joint's range in which collision shapes are kept clear.
 const CLEARED: usize = 40;
 
-/// Each joint in turn over its range in small steps, the others as in the first state. [pose][part]
-fn sweeps(tree: &KinematicTree, steps: usize) -> Vec<Vec<Pose>> {
-    let Some(first) = tree.joints.iter().map(|j| j.values.first().copied()).collect::<Option<Vec<f64>>>() else {
-        return Vec::new();
-    };
-    let mut out = Vec::new();
-    for (j, joint) in tree.joints.iter().enumerate() {
-        for k in 0..=steps {
-            let mut q = first.clone();
-            q[j] = joint.limits[0] + (joint.limits[1] - joint.limits[0]) * k as f64 / steps as f64;
-            out.push(tree.poses(&q));
-        }
-    }
-    out
-}
+/// Shows at most so many observations to a visitor, evenly chosen, in batches.
+type Shown<'a, E> = dyn Fn(usize, &mut dyn FnMut(&[Observation])) -> Result<(), E> + 'a;
 
-fn colour<E: From<Cancelled> + Send>(
+/// Moves the surfaces onto what was measured.
+fn snap<E: From<Cancelled> + Send>(
     meshes: &mut [TriMesh],
-    input: &Input,
-    load: &(dyn Fn(usize) -> Result<Observation, E> + Sync),
     poses: &[Vec<Pose>],
-    config: &Config,
     voxel: f32,
-    progress: &Progress,
+    shown: &Shown<E>,
 ) -> Result<(), E> {
-    let n = input.n_observations;
-    let used = n.min(config.color_views.max(1));
-    let chosen: Vec<usize> = (0..used).map(|k| k * n / used.max(1)).collect();
     let normals: Vec<Vec<Vec3>> = meshes.iter().map(TriMesh::vertex_normals).collect();
-    let mut sums: Vec<Vec<[f32; 4]>> = meshes.iter().map(|m| vec![[0.0; 4]; m.vertices.len()]).collect();
-    for batch in chosen.chunks(32) {
-        progress.check()?;
-        let seen = batch.par_iter().map(|&i| load(i)).collect::<Result<Vec<_>, E>>()?;
+    let mut pulls: Vec<Vec<snap::Pull>> = meshes.iter().map(|m| vec![Default::default(); m.vertices.len()]).collect();
+    shown(SNAP_VIEWS, &mut |seen| {
         for (part, mesh) in meshes.iter().enumerate() {
             let at: Vec<Pose> = seen.iter().map(|o| poses[o.state][part]).collect();
-            color::accumulate(&mut sums[part], mesh, &normals[part], part as u8, &seen, &at, 2.0 * voxel);
+            snap::accumulate(&mut pulls[part], mesh, &normals[part], part as u8, seen, &at, SNAP_REACH * voxel);
         }
-    }
-    for (mesh, sums) in meshes.iter_mut().zip(&sums) {
-        color::finish(mesh, sums);
-    }
+    })?;
+    meshes.iter_mut().zip(&pulls).for_each(|(mesh, pulls)| snap::finish(mesh, pulls, voxel));
+    Ok(())
+}
+
+/// Colours the surfaces as they look in at most `views` pictures.
+fn colour<E: From<Cancelled> + Send>(
+    meshes: &mut [TriMesh],
+    poses: &[Vec<Pose>],
+    voxel: f32,
+    views: usize,
+    shown: &Shown<E>,
+) -> Result<(), E> {
+    let normals: Vec<Vec<Vec3>> = meshes.iter().map(TriMesh::vertex_normals).collect();
+    let mut sums: Vec<Vec<[f32; 4]>> = meshes.iter().map(|m| vec![[0.0; 4]; m.vertices.len()]).collect();
+    shown(views, &mut |seen| {
+        for (part, mesh) in meshes.iter().enumerate() {
+            let at: Vec<Pose> = seen.iter().map(|o| poses[o.state][part]).collect();
+            color::accumulate(&mut sums[part], mesh, &normals[part], part as u8, seen, &at, 2.0 * voxel);
+        }
+    })?;
+    meshes.iter_mut().zip(&sums).for_each(|(mesh, sums)| color::finish(mesh, sums));
     Ok(())
 }

@@ -4,13 +4,10 @@
 //! convex pieces of both would overlap and jam the joint. So the collision shape of a part leaves out what comes
 //! within one voxel of a part nearer to the root in any recorded state. The visual mesh keeps everything.
 
-use crate::fuse::Field;
+use crate::field::{Field, ONE_VOXEL};
 use glam::Vec3;
 use hingecast_geom::Pose;
 use rayon::prelude::*;
-
-/// A field's value (in truncations of three voxels) one voxel outside a surface.
-const ONE_VOXEL: f32 = 1.0 / 3.0;
 
 /// The field of `part` without what comes within a voxel of the fields of `nearer` parts.
 /// `poses[state][part]`: world from canonical.
@@ -26,13 +23,11 @@ pub fn trim(part: usize, fields: &[Option<Field>], nearer: &[usize], poses: &[Ve
             Some((fields[q].as_ref()?, poses.iter().map(into).collect()))
         })
         .collect();
-    let [nx, ny, _] = own.dims;
     let values = own.values.par_iter().enumerate().map(|(i, &value)| {
         if value >= 0.0 {
             return value;
         }
-        let voxel = Vec3::new((i % nx) as f32, (i / nx % ny) as f32, (i / (nx * ny)) as f32);
-        let x = own.origin + voxel * own.voxel;
+        let x = own.place(i);
         let touches = others.iter().any(|(field, into)| into.iter().any(|(r, t)| field.at(*r * x + *t) < ONE_VOXEL));
         if touches { 1.0 } else { value }
     });

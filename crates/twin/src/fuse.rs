@@ -5,7 +5,7 @@
 //! is empty; a background pixel empties its whole ray; and what no ray ever reached counts as solid, so that
 //! closed things come out closed and have a volume. Units: scene units; frame: canonical world.
 
-use crate::slabs::Slabs;
+use crate::field::Field;
 use crate::thin::COVER_UNIT;
 use crate::{BACKGROUND, Observation, UNKNOWN};
 use glam::Vec3;
@@ -17,12 +17,12 @@ use std::sync::atomic::{AtomicU32, Ordering};
 /// Voxels per block edge.
 const B: i32 = 8;
 pub(crate) const BLOCK: usize = (B * B * B) as usize;
+/// Distances are kept up to here, voxels.
+pub const TRUNCATION: f32 = 3.0;
 /// A block needs this many surface pixels: single flying pixels at depth edges open no block.
 const MIN_HITS: u32 = 3;
 /// Rays that must agree before space without any surface counts as empty.
 const MIN_EMPTY: u16 = 2;
-/// Voxels from the surface beyond which unseen space is nobody's shell.
-const SHELL: usize = 4;
 
 pub(crate) type Key = [i32; 3];
 
@@ -54,23 +54,11 @@ impl Block {
     }
 }
 
-/// Signed distance on a dense grid, in units of the truncation: -1 inside .. +1 outside.
-pub struct Field {
-    pub origin: Vec3,
-    pub voxel: f32,
-    pub dims: [usize; 3],
-    pub values: Vec<f32>,
-    /// True where a ray or a surface said something.
-    pub known: Vec<bool>,
-    /// True where views agree on a surface in the voxel.
-    pub firm: Vec<bool>,
-}
-
 impl PartVolume {
     pub fn new(voxel: f32) -> Self {
         Self {
             voxel,
-            truncation: 3.0 * voxel,
+            truncation: TRUNCATION * voxel,
             hits: BTreeMap::new(),
             blocks: Vec::new(),
             hollow: Vec::new(),
@@ -156,24 +144,13 @@ impl PartVolume {
         });
     }
 
-    /// The dense field. `taken(x, deep)` says that canonical point `x` is another part's room: space that no ray reached is
-    /// then not this part's; `deep`: it is far from all seen surface of this part. With `enclosed`, unreached space is solid only where the
-    /// part's own surface encloses it; without (the root, whose underside no camera sees) wherever it is not beyond all that was seen.
-    pub fn field(&self, taken: &(dyn Fn(Vec3, bool) -> bool + Sync), enclosed: bool) -> Field {
+    /// What was seen of the part, as a dense field; where nothing was, it is solid and not `known`.
+    pub fn seen(&self) -> Field {
         // One voxel of empty border on each side closes the surface.
         let n = |a: usize| ((self.hi[a] - self.lo[a] + 1) * B) as usize + 2;
         let dims = [n(2), n(1), n(0)];
         let base = Vec3::new(self.lo[2] as f32, self.lo[1] as f32, self.lo[0] as f32) * self.block_size();
-        let origin = base - self.voxel * 0.5;
-        let total = dims[0] * dims[1] * dims[2];
-        let mut field = Field {
-            origin,
-            voxel: self.voxel,
-            dims,
-            values: vec![1.0; total],
-            known: vec![true; total],
-            firm: vec![false; total],
-        };
+        let mut field = Field::empty(base - self.voxel * 0.5, self.voxel, dims);
         let mut set = |i: usize, value: Option<f32>| {
             field.values[i] = value.unwrap_or(-1.0);
             field.known[i] = value.is_some();
@@ -186,17 +163,6 @@ impl PartVolume {
             (0..BLOCK).for_each(|i| set(self.index(dims, key, i), (*empty >= MIN_EMPTY).then_some(1.0)));
         }
         self.keep_thin(&mut field);
-        if enclosed {
-            field.open_unreached();
-        } else {
-            field.open_beyond_seen();
-        }
-        let shell = field.shell();
-        let open: Vec<usize> = (0..total)
-            .into_par_iter()
-            .filter(|&i| !field.known[i] && field.values[i] < 0.0 && taken(field.place(i), !shell[i]))
-            .collect();
-        open.into_iter().for_each(|i| field.values[i] = 1.0);
         field
     }
 
@@ -223,91 +189,6 @@ fn count_hits(blocks: &[Block], seen: &Observation, world_from_canonical: &Pose,
             let faces = pixel_area * depth * depth / (voxel * voxel);
             blocks[b].hits[inner as usize].fetch_add(1, Ordering::Relaxed);
             blocks[b].cover[inner as usize].fetch_add((faces * COVER_UNIT) as u32, Ordering::Relaxed);
-        }
-    }
-}
-
-impl Field {
-    /// Where voxel `i` is.
-    fn place(&self, i: usize) -> Vec3 {
-        let [nx, ny, _] = self.dims;
-        self.origin + Vec3::new((i % nx) as f32, (i / nx % ny) as f32, (i / (nx * ny)) as f32) * self.voxel
-    }
-
-    /// What all solid voxels lie within.
-    pub fn hull(&self) -> Slabs {
-        Slabs::around((0..self.values.len()).filter(|&i| self.values[i] < 0.0).map(|i| self.place(i)))
-    }
-
-    fn seen_solid(&self, i: usize) -> bool {
-        self.known[i] && self.values[i] < 0.0
-    }
-
-    /// Empties unknown space beyond the seen surface: below the walls of a cabinet whose underside nobody saw there is no cabinet.
-    fn open_beyond_seen(&mut self) {
-        let seen = Slabs::around((0..self.values.len()).filter(|&i| self.seen_solid(i)).map(|i| self.place(i)));
-        for i in 0..self.values.len() {
-            if !self.known[i] && !seen.hold(self.place(i)) {
-                self.values[i] = 1.0;
-            }
-        }
-    }
-
-    /// Whether a voxel is within [`SHELL`] voxels (along the axes) of solid that a ray reached.
-    fn shell(&self) -> Vec<bool> {
-        let mut near: Vec<bool> = (0..self.values.len()).map(|i| self.seen_solid(i)).collect();
-        let [nx, ny, nz] = self.dims;
-        for (n, stride) in [(nx, 1), (ny, nx), (nz, nx * ny)] {
-            let from = near.clone();
-            near.par_iter_mut().enumerate().for_each(|(i, near)| {
-                let at = i / stride % n;
-                let (back, forth) = (at.min(SHELL), (n - 1 - at).min(SHELL));
-                *near = (i - back * stride..=i + forth * stride).step_by(stride).any(|j| from[j]);
-            });
-        }
-        near
-    }
-
-    /// Empties unknown space that connects to the grid's border without crossing the surface.
-    fn open_unreached(&mut self) {
-        let [nx, ny, nz] = self.dims;
-        let passable = |f: &Field, i: usize| !f.known[i] || f.values[i] >= 0.0;
-        let mut seen = vec![false; self.values.len()];
-        // The border is empty all around, so one corner reaches all of it.
-        let mut stack = vec![0usize];
-        seen[0] = true;
-        while let Some(i) = stack.pop() {
-            if !self.known[i] {
-                self.values[i] = 1.0;
-            }
-            let (x, y, z) = (i % nx, i / nx % ny, i / (nx * ny));
-            let mut visit = |ok: bool, j: usize| {
-                if ok && !seen[j] && passable(self, j) {
-                    seen[j] = true;
-                    stack.push(j);
-                }
-            };
-            visit(x > 0, i.wrapping_sub(1));
-            visit(x + 1 < nx, i + 1);
-            visit(y > 0, i.wrapping_sub(nx));
-            visit(y + 1 < ny, i + nx);
-            visit(z > 0, i.wrapping_sub(nx * ny));
-            visit(z + 1 < nz, i + nx * ny);
-        }
-    }
-
-    pub fn index(&self, x: usize, y: usize, z: usize) -> usize {
-        (z * self.dims[1] + y) * self.dims[0] + x
-    }
-
-    /// Value at the voxel nearest to `x`; outside the grid is empty.
-    pub fn at(&self, x: Vec3) -> f32 {
-        let p = (x - self.origin) / self.voxel + 0.5;
-        let inside = |v: f32, n: usize| v >= 0.0 && v < n as f32;
-        if inside(p.x, self.dims[0]) && inside(p.y, self.dims[1]) && inside(p.z, self.dims[2]) {
-            self.values[self.index(p.x as usize, p.y as usize, p.z as usize)]
-        } else {
-            1.0
         }
     }
 }

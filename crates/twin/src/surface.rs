@@ -1,7 +1,7 @@
 //! The zero surface of a field as triangles: naive surface nets (Gibson 1998), one vertex per crossed cell,
 //! one quad per crossed edge. Closed wherever the field's border is outside. Also drops crumbs.
 
-use crate::fuse::Field;
+use crate::field::Field;
 use glam::Vec3;
 use hingecast_geom::TriMesh;
 use std::collections::BTreeMap;

@@ -1,13 +1,16 @@
 //! Sheets and bars thinner than a voxel: front and back, averaged, leave nothing negative, and pixels beside a bar look past it. What many
 //! pixels saw all the same is made solid again.
 
-use crate::fuse::{BLOCK, Field, PartVolume};
+use crate::field::Field;
+use crate::fuse::{BLOCK, PartVolume};
 use glam::Vec3;
 use std::collections::BTreeSet;
 use std::sync::atomic::Ordering;
 
 /// Unit in which a block counts the area that pixels stand for: this many are a voxel's face.
 pub const COVER_UNIT: f32 = 256.0;
+/// A sheet is nowhere deeper than this, where it is not lost altogether.
+const SHEET: f32 = 0.1;
 /// Surface pixels that a voxel needs.
 const HITS: u32 = 4;
 /// Kept when the average distance to the surface is below three quarters of a voxel ...
@@ -36,7 +39,7 @@ impl PartVolume {
             let best = field.beside(at).map(|j| cover[j]).fold(0.0, f32::max);
             field.firm[at] = cover[at] >= COVER && cover[at] + best >= COVER_OF_TWO;
             if field.values[at] >= 0.0 && (field.firm[at] || field.values[at] < VALUE) {
-                let solid = field.around(at).any(|j| field.values[j] < 0.0);
+                let solid = field.around(at).any(|j| field.values[j] < -SHEET);
                 if solid { beside_solid.push(at) } else { lost.push(at) }
             }
         }

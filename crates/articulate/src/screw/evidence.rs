@@ -183,6 +183,11 @@ impl Evidence {
         self.height(t, x, n).is_some_and(|d| d.abs() < self.tolerance)
     }
 
+    /// How near `x` is to surface of state t that faces along `n`: 1 on it, half at the tolerance, 0 where there is none.
+    pub fn nearness(&self, t: usize, x: Vec3, n: Vec3) -> f32 {
+        self.height(t, x, n).map_or(0.0, |d| 1.0 / (1.0 + (d / self.tolerance).powi(2)))
+    }
+
     /// `raw` with an eye for less than the grid resolves: above the surface that counts as support a sample would have been seen, and below
     /// it nobody saw it.
     pub fn sharpened(&self, raw: Verdict, s: &Sample, from: &[Motion]) -> Verdict {

@@ -10,9 +10,11 @@
 //! discover       parts one after another, by what they explain (jury) and how usual they are (plausible)
 //! chains         what hangs on what
 //! hidden         states that do not show a part
+//! nearby         values a voxel or two beside the right one
 //! settle         states' frames, all joints together (refine, twist)
 //! straight       axes along their part's faces, where that explains as much
 //! labels         which part a sample belongs to
+//! borders        the same where parts meet, pixel by pixel
 //! steady         noisy recordings: every view aligned to what stands still, then settled again
 //! information    how sharply the depth holds the pose of every part
 //! photometric    noisy recordings: joints and frames by pictures and depth together (pictures: gradients through the gaussians)
@@ -20,6 +22,7 @@
 //! ```
 
 mod adopt;
+mod borders;
 pub mod cameras;
 mod chains;
 pub mod cloud;
@@ -32,6 +35,7 @@ mod hypotheses;
 mod information;
 mod jury;
 pub mod labels;
+pub mod nearby;
 pub mod photometric;
 mod pictures;
 mod plausible;
@@ -80,7 +84,7 @@ pub struct Labelled {
 /// Everything that the depth says about parts and joints.
 pub struct Found {
     pub tree: KinematicTree,
-    /// The surface of every state, one sample a voxel and facing.
+    /// The surface of every state, one sample a voxel and facing, finer where parts meet.
     pub samples: Vec<Labelled>,
     /// Edge of a voxel, scene units.
     pub voxel: f32,
@@ -164,12 +168,22 @@ pub fn run<E: From<Cancelled>>(
     }
     let information = if noisy { information::of_parts(&evidence, &labels, &settled) } else { Vec::new() };
     let (doubts, certainty) = doubts::doubts(&evidence, &settled, &labels, seed);
-    let of_state = |(state, own): (usize, &Vec<u8>)| -> Vec<Labelled> {
-        let points = &evidence.clouds[state].points;
-        points.iter().zip(own).map(|(point, part)| Labelled { state, point: *point, part: *part }).collect()
+    let samples = if noisy {
+        let of_state = |(state, own): (usize, &Vec<u8>)| -> Vec<Labelled> {
+            let points = &evidence.clouds[state].points;
+            points.iter().zip(own).map(|(point, part)| Labelled { state, point: *point, part: *part }).collect()
+        };
+        labels.iter().enumerate().flat_map(of_state).collect()
+    } else {
+        borders::sharpen::<E>(&evidence, &settled.tree, &labels, &mut |state| {
+            progress.report(state, n_states, "borders")?;
+            let mut views = states(state)?;
+            views.iter_mut().zip(&cameras[state]).for_each(|(view, pose)| view.camera.camera_from_world = *pose);
+            Ok(views)
+        })?
     };
     Ok(Found {
-        samples: labels.iter().enumerate().flat_map(of_state).collect(),
+        samples,
         voxel: lattice.voxel,
         tree: settled.tree,
         cameras,

@@ -9,6 +9,7 @@ use super::doubts::{REFUTED, rival};
 use super::evidence::{Evidence, Motion, Sample, Verdict, contradictions};
 use super::hidden;
 use super::labels::label;
+use super::nearby::look_beside;
 use super::refine::{Member, Report, Settings, refine};
 use super::straight::straighten;
 use crate::icp::{self, Surface};
@@ -95,6 +96,7 @@ pub fn settle(evidence: &mut Evidence, found: &Discovery, seed: u64) -> Settled 
             }
             evidence.transform(&moved);
         }
+        look_beside(evidence, &mut tree, &owners, seed);
         let members: Vec<Member> = owners.all(evidence).filter(|m| m.part != 0).collect();
         let gate = if round == 0 { 1.0 } else { 0.6 } * voxel;
         let settings = Settings { gates: [gate, 0.5 * gate], rounds: 6, partners: 6 };
