@@ -80,7 +80,7 @@ pub fn build<E: From<Cancelled> + Send>(
     let volumes = fuse::fuse(input.n_observations, load, &poses, voxel, progress)?;
 
     let order = solid::leaves_first(tree);
-    let fields = solid::fields(&volumes, tree, &poses);
+    let fields = solid::fields(volumes, tree, &poses);
     progress.check()?;
 
     let shown = |most: usize, visit: &mut dyn FnMut(&[Observation])| -> Result<(), E> {

@@ -10,10 +10,10 @@ use hingecast_geom::{KinematicTree, Pose};
 const BETWEEN: usize = 120;
 
 /// The fields of all parts; `poses[state][part]`: world from canonical.
-pub fn fields(volumes: &[Option<PartVolume>], tree: &KinematicTree, poses: &[Vec<Pose>]) -> Vec<Option<Field>> {
-    let mut fields: Vec<Option<Field>> = volumes.iter().map(|v| v.as_ref().map(PartVolume::seen)).collect();
+pub fn fields(volumes: Vec<Option<PartVolume>>, tree: &KinematicTree, poses: &[Vec<Pose>]) -> Vec<Option<Field>> {
+    let mut fields: Vec<Option<Field>> = volumes.into_iter().map(|v| Some(v?.seen())).collect();
     // What solid voxels of a part that is done lie within.
-    let mut hulls: Vec<Option<Slabs>> = volumes.iter().map(|_| None).collect();
+    let mut hulls: Vec<Option<Slabs>> = fields.iter().map(|_| None).collect();
     // A part also empties what it passes through between the states, in the parts that carry it.
     let swept: Vec<Vec<Pose>> = poses.iter().cloned().chain(sweeps(tree, BETWEEN)).collect();
     let carried = |part: usize, by: usize| tree.ancestry(part).iter().any(|&j| tree.joints[j].parent == by);

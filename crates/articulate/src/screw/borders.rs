@@ -90,56 +90,78 @@ pub fn sharpen<E>(
             continue;
         }
         let points = fine_points(evidence, state, border, &states(state)?);
-        // Of every part, how it goes from here to the states that are asked.
-        let there =
-            |p: usize| asked.iter().map(|(t, _)| Motion::from(poses[p][*t] * poses[p][state].inverse())).collect();
-        let there: Vec<Vec<Motion>> = (0..tree.parts.len()).map(there).collect();
-        let same = SAME * evidence.lattice.voxel;
-        let ask = |x: Vec3, p: usize| {
-            let others = asked.iter().zip(&there[p]).filter(|((t, _), _)| *t != state);
-            others.fold(Answers::default(), |sum, ((_, views), m)| sum + said(views, m.apply(x), same))
+        let there = |p: &Vec<Pose>| asked.iter().map(|(t, _)| Motion::from(p[*t] * p[state].inverse())).collect();
+        let here = Here {
+            state,
+            cloud,
+            labels: &labels[state],
+            samples: PointTree::new(&cloud.points),
+            asked: &asked,
+            there: poses.iter().map(there).collect(),
+            same: SAME * evidence.lattice.voxel,
         };
         let near = PointTree::new(&points);
-        let samples = PointTree::new(&cloud.points);
         let label = |x: &Vec3| {
-            // That of the sample in whose plane it lies.
-            let near_samples = samples.k_nearest(*x, AROUND);
-            let far = |j: &u32| {
-                let gap = *x - cloud.points[*j as usize];
-                gap.length_squared() + OFF_PLANE * cloud.normals[*j as usize].dot(gap).powi(2)
-            };
-            let Some(j) = near_samples.iter().copied().min_by(|a, b| far(a).total_cmp(&far(b))) else {
-                return Labelled { state, point: *x, part: 0 };
-            };
-            let held = labels[state][j as usize];
-            let stays = Labelled { state, point: *x, part: held };
-            // Only what is contradicted changes hands: a wall that is hidden elsewhere is met nowhere else either.
-            if ask(*x, held as usize).through == 0.0 {
-                return stays;
-            }
-            let beside: Vec<Vec3> = near.k_nearest(*x, BESIDE).into_iter().map(|j| points[j as usize]).collect();
-            let mean = |p: u8| {
-                let sum = beside.iter().fold(Answers::default(), |sum, x| sum + ask(*x, p as usize));
-                let (own, n) = (ask(*x, p as usize), beside.len().max(1) as f32);
-                Answers { met: 0.5 * (own.met + sum.met / n), through: 0.5 * (own.through + sum.through / n) }
-            };
-            let own = mean(held);
-            let mut best = (own.met - 2.0 * own.through, held);
-            let candidates = near_samples.iter().map(|j| labels[state][*j as usize]);
-            let rivals: BTreeSet<u8> = candidates.filter(|p| *p != held).collect();
-            for p in rivals {
-                let other = mean(p);
-                let gain = other.met - 2.0 * other.through;
-                let taken = own.through - other.through >= CLEARLY && other.met > own.met - CLEARLY;
-                if taken && gain > best.0 {
-                    best = (gain, p);
-                }
-            }
-            Labelled { part: best.1, ..stays }
+            let beside = || near.k_nearest(*x, BESIDE).into_iter().map(|j| points[j as usize]).collect();
+            Labelled { state, point: *x, part: here.part_at(*x, beside) }
         };
         out.par_extend(points.par_iter().map(label));
     }
     Ok(out)
+}
+
+/// One state, and how its points go to those that are asked.
+struct Here<'a> {
+    state: usize,
+    cloud: &'a Surface,
+    labels: &'a [u8],
+    samples: PointTree,
+    /// State and its pictures.
+    asked: &'a [(usize, Vec<Witness>)],
+    /// World at an asked state from world here. [part][asked]
+    there: Vec<Vec<Motion>>,
+    same: f32,
+}
+
+impl Here<'_> {
+    /// The part of a point; `beside`: its neighbours, asked for if need be.
+    fn part_at(&self, x: Vec3, beside: impl Fn() -> Vec<Vec3>) -> u8 {
+        let near = self.samples.k_nearest(x, AROUND);
+        // That of the sample in whose plane it lies.
+        let far = |j: &u32| {
+            let gap = x - self.cloud.points[*j as usize];
+            gap.length_squared() + OFF_PLANE * self.cloud.normals[*j as usize].dot(gap).powi(2)
+        };
+        let held = near.iter().min_by(|a, b| far(a).total_cmp(&far(b))).map_or(0, |j| self.labels[*j as usize]);
+        // Only what is contradicted changes hands: a wall that is hidden elsewhere is met nowhere else either.
+        if self.ask(x, held).through == 0.0 {
+            return held;
+        }
+        let beside = beside();
+        let mean = |p: u8| {
+            let sum = beside.iter().fold(Answers::default(), |sum, x| sum + self.ask(*x, p));
+            let (own, n) = (self.ask(x, p), beside.len().max(1) as f32);
+            Answers { met: 0.5 * (own.met + sum.met / n), through: 0.5 * (own.through + sum.through / n) }
+        };
+        let own = mean(held);
+        let mut best = (own.met - 2.0 * own.through, held);
+        let rivals: BTreeSet<u8> = near.iter().map(|j| self.labels[*j as usize]).filter(|p| *p != held).collect();
+        for p in rivals {
+            let other = mean(p);
+            let gain = other.met - 2.0 * other.through;
+            let taken = own.through - other.through >= CLEARLY && other.met > own.met - CLEARLY;
+            if taken && gain > best.0 {
+                best = (gain, p);
+            }
+        }
+        best.1
+    }
+
+    /// What the other states say about a point if it is the part's.
+    fn ask(&self, x: Vec3, part: u8) -> Answers {
+        let others = self.asked.iter().zip(&self.there[part as usize]).filter(|((t, _), _)| *t != self.state);
+        others.fold(Answers::default(), |sum, ((_, views), m)| sum + said(views, m.apply(x), self.same))
+    }
 }
 
 /// How many states met a point, and how many looked through it.
