@@ -8,6 +8,7 @@ use super::Labelled;
 use super::cloud::{BACKGROUND, DepthView, OBJECT};
 use super::discover::poses_of;
 use super::evidence::{Evidence, Motion};
+use crate::icp::Surface;
 use glam::{DVec2, Vec3};
 use hingecast_geom::{KinematicTree, PointTree, Pose};
 use rayon::prelude::*;
