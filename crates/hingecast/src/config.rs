@@ -88,6 +88,7 @@ impl Config {
                 c.track.steps = 240;
                 c.track.rate[0] = 1.6e-3;
                 c.screw.cells = 72;
+                c.screw.borders = false;
                 c.twin.voxel = 1.0 / 160.0;
             }
             Preset::Default => {}
