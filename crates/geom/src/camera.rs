@@ -1,7 +1,7 @@
 //! The pinhole camera: OpenCV axes, pixel centres at +0.5, depth is z.
 
 use crate::Pose;
-use glam::{DVec2, DVec3};
+use glam::{DVec2, DVec3, Mat3, Vec3};
 use serde::{Deserialize, Serialize};
 
 /// Pinhole camera without distortion (importers undistort).
@@ -64,6 +64,48 @@ impl Camera {
     pub fn resized(&self, width: usize, height: usize) -> Self {
         let (sx, sy) = (width as f64 / self.width as f64, height as f64 / self.height as f64);
         Self { width, height, fx: self.fx * sx, fy: self.fy * sy, cx: self.cx * sx, cy: self.cy * sy, ..*self }
+    }
+}
+
+/// A camera in f32, ready to project many points of one frame.
+#[derive(Clone, Copy, Debug)]
+pub struct Projection {
+    /// Camera frame from the points' frame.
+    pub rot: Mat3,
+    trans: Vec3,
+    /// fx fy cx cy
+    f: [f32; 4],
+    width: usize,
+    height: usize,
+}
+
+impl Projection {
+    /// For points of the frame whose pose in the world is `world_from_frame`.
+    pub fn new(camera: &Camera, world_from_frame: &Pose) -> Self {
+        let pose = camera.camera_from_world * *world_from_frame;
+        Self {
+            rot: pose.mat3().as_mat3(),
+            trans: pose.trans.as_vec3(),
+            f: [camera.fx as f32, camera.fy as f32, camera.cx as f32, camera.cy as f32],
+            width: camera.width,
+            height: camera.height,
+        }
+    }
+
+    pub fn to_camera(&self, x: Vec3) -> Vec3 {
+        self.rot * x + self.trans
+    }
+
+    /// Pixel position of a point of the camera frame; meaningless unless z > 0.
+    pub fn uv(&self, x: Vec3) -> (f32, f32) {
+        (self.f[0] * x.x / x.z + self.f[2], self.f[1] * x.y / x.z + self.f[3])
+    }
+
+    /// Index of the pixel on which a point of the camera frame falls, if it is in the picture.
+    pub fn pixel(&self, x: Vec3) -> Option<usize> {
+        let (u, v) = self.uv(x);
+        let inside = x.z > 0.0 && u >= 0.0 && v >= 0.0 && u < self.width as f32 && v < self.height as f32;
+        inside.then(|| v as usize * self.width + u as usize)
     }
 }
 

@@ -19,7 +19,7 @@ pub mod progress;
 pub mod random;
 pub mod tree;
 
-pub use camera::Camera;
+pub use camera::{Camera, Projection};
 pub use gaussians::Gaussians;
 pub use input_error::InputError;
 pub use mesh::TriMesh;

@@ -3,9 +3,9 @@
 use crate::field::Field;
 use crate::{
     Inertial, Observation, PartModel, Twin, clearance, color, fuse, hulls, mass, separate, simplify, snap, solid,
-    surface,
+    surface, vertices,
 };
-use glam::{DMat3, DVec3, Vec3};
+use glam::{DMat3, DVec3};
 use hingecast_geom::{Cancelled, KinematicTree, Pose, Progress, TriMesh};
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
@@ -99,7 +99,10 @@ pub fn build<E: From<Cancelled> + Send>(
     let mut meshes: Vec<TriMesh> = fields.par_iter().map(|f| f.as_ref().map_or_else(TriMesh::default, fine)).collect();
     // For mass and collision, where a sheet should stay as thick as the grid makes it.
     let thick: Vec<TriMesh> = meshes.par_iter().map(simple).collect();
-    snap(&mut meshes, &poses, voxel, &shown)?;
+    let pulls = vertices::collect(&meshes, &poses, SNAP_VIEWS, &shown, &|pull, glimpse| {
+        snap::accumulate(pull, glimpse, SNAP_REACH * voxel);
+    })?;
+    meshes.iter_mut().zip(&pulls).for_each(|(mesh, pulls)| snap::finish(mesh, pulls, voxel));
     meshes = meshes.par_iter().map(simple).collect();
     // Root first, then along the tree: every part keeps clear of those before it, also between recorded states.
     let path: Vec<Vec<Pose>> = poses.iter().cloned().chain(solid::sweeps(tree, CLEARED)).collect();
@@ -114,7 +117,10 @@ pub fn build<E: From<Cancelled> + Send>(
         })
         .collect();
     drop(fields);
-    colour(&mut meshes, &poses, voxel, config.color_views, &shown)?;
+    let sums = vertices::collect(&meshes, &poses, config.color_views, &shown, &|sum, glimpse| {
+        color::accumulate(sum, glimpse, 2.0 * voxel);
+    })?;
+    meshes.iter_mut().zip(&sums).for_each(|(mesh, sums)| color::finish(mesh, sums));
 
     let hull_config = hulls::HullConfig { max_hulls: config.max_hulls, ..Default::default() };
     let decomposed: Vec<(Vec<TriMesh>, usize)> =
@@ -168,45 +174,3 @@ pub fn build<E: From<Cancelled> + Send>(
 
 /// Steps over a joint's range in which collision shapes are kept clear.
 const CLEARED: usize = 40;
-
-/// Shows at most so many observations to a visitor, evenly chosen, in batches.
-type Shown<'a, E> = dyn Fn(usize, &mut dyn FnMut(&[Observation])) -> Result<(), E> + 'a;
-
-/// Moves the surfaces onto what was measured.
-fn snap<E: From<Cancelled> + Send>(
-    meshes: &mut [TriMesh],
-    poses: &[Vec<Pose>],
-    voxel: f32,
-    shown: &Shown<E>,
-) -> Result<(), E> {
-    let normals: Vec<Vec<Vec3>> = meshes.iter().map(TriMesh::vertex_normals).collect();
-    let mut pulls: Vec<Vec<snap::Pull>> = meshes.iter().map(|m| vec![Default::default(); m.vertices.len()]).collect();
-    shown(SNAP_VIEWS, &mut |seen| {
-        for (part, mesh) in meshes.iter().enumerate() {
-            let at: Vec<Pose> = seen.iter().map(|o| poses[o.state][part]).collect();
-            snap::accumulate(&mut pulls[part], mesh, &normals[part], part as u8, seen, &at, SNAP_REACH * voxel);
-        }
-    })?;
-    meshes.iter_mut().zip(&pulls).for_each(|(mesh, pulls)| snap::finish(mesh, pulls, voxel));
-    Ok(())
-}
-
-/// Colours the surfaces as they look in at most `views` pictures.
-fn colour<E: From<Cancelled> + Send>(
-    meshes: &mut [TriMesh],
-    poses: &[Vec<Pose>],
-    voxel: f32,
-    views: usize,
-    shown: &Shown<E>,
-) -> Result<(), E> {
-    let normals: Vec<Vec<Vec3>> = meshes.iter().map(TriMesh::vertex_normals).collect();
-    let mut sums: Vec<Vec<[f32; 4]>> = meshes.iter().map(|m| vec![[0.0; 4]; m.vertices.len()]).collect();
-    shown(views, &mut |seen| {
-        for (part, mesh) in meshes.iter().enumerate() {
-            let at: Vec<Pose> = seen.iter().map(|o| poses[o.state][part]).collect();
-            color::accumulate(&mut sums[part], mesh, &normals[part], part as u8, seen, &at, 2.0 * voxel);
-        }
-    })?;
-    meshes.iter_mut().zip(&sums).for_each(|(mesh, sums)| color::finish(mesh, sums));
-    Ok(())
-}

@@ -1,45 +1,21 @@
 //! Vertex colours: the mean of the pixels that really show the vertex, facing views first.
 
-use crate::Observation;
-use hingecast_geom::{Pose, TriMesh};
-use rayon::prelude::*;
+use crate::vertices::Glimpse;
+use hingecast_geom::TriMesh;
 
-/// Adds what `batch` sees of part `part` to `sums` (rgb and weight per vertex).
-/// A pixel counts when it carries the part's label and its depth is the vertex's within `tolerance`.
-pub fn accumulate(
-    sums: &mut [[f32; 4]],
-    mesh: &TriMesh,
-    normals: &[glam::Vec3],
-    part: u8,
-    batch: &[Observation],
-    world_from_canonical: &[Pose],
-    tolerance: f32,
-) {
-    for (seen, pose) in batch.iter().zip(world_from_canonical) {
-        let camera_from_canonical = seen.camera.camera_from_world * *pose;
-        let (rot, trans) = (camera_from_canonical.mat3().as_mat3(), camera_from_canonical.trans.as_vec3());
-        let c = &seen.camera;
-        sums.par_iter_mut().enumerate().for_each(|(i, sum)| {
-            let x = rot * mesh.vertices[i] + trans;
-            let facing = -(rot * normals[i]).dot(x.normalize_or_zero());
-            if !(x.z > 0.0 && facing > 0.2) {
-                return;
-            }
-            let (u, v) = (c.fx as f32 * x.x / x.z + c.cx as f32, c.fy as f32 * x.y / x.z + c.cy as f32);
-            if !(u >= 0.0 && v >= 0.0 && u < c.width as f32 && v < c.height as f32) {
-                return;
-            }
-            let p = v as usize * c.width + u as usize;
-            if seen.labels[p] != part || (seen.depth[p] - x.z).abs() > tolerance {
-                return;
-            }
-            let w = facing * facing;
-            for k in 0..3 {
-                sum[k] += w * seen.rgb[3 * p + k] as f32;
-            }
-            sum[3] += w;
-        });
+/// Adds what a pixel says to a vertex's `sum` (rgb and weight).
+/// It counts when it carries the part's label and its depth is the vertex's within `tolerance`.
+pub fn accumulate(sum: &mut [f32; 4], g: &Glimpse, tolerance: f32) {
+    let (seen, p) = (g.seen, g.pixel);
+    let facing = -g.normal.dot(g.x.normalize_or_zero());
+    if !(facing > 0.2) || seen.labels[p] != g.part || (seen.depth[p] - g.x.z).abs() > tolerance {
+        return;
     }
+    let w = facing * facing;
+    for k in 0..3 {
+        sum[k] += w * seen.rgb[3 * p + k] as f32;
+    }
+    sum[3] += w;
 }
 
 /// Turns the sums into colours; a vertex that nobody saw takes the mean of its coloured neighbours, else grey.

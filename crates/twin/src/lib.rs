@@ -9,7 +9,7 @@
 
 pub mod build;
 pub mod clearance;
-pub mod color;
+mod color;
 pub mod export;
 mod field;
 pub mod fuse;
@@ -25,6 +25,7 @@ mod solid;
 pub mod surface;
 mod thin;
 pub mod urdf;
+mod vertices;
 
 pub use build::{Config, build};
 pub use export::{ExportError, write};

@@ -6,8 +6,8 @@
 //! gave are put to the same test and lose when the other states clearly prefer another part.
 
 use crate::{BACKGROUND, Observation};
-use glam::{DVec3, Mat3, Vec3};
-use hingecast_geom::Pose;
+use glam::{DVec3, Vec3};
+use hingecast_geom::{Pose, Projection};
 use rayon::prelude::*;
 use std::collections::BTreeMap;
 
@@ -17,27 +17,14 @@ const STATES: usize = 12;
 
 /// A camera of another state, ready to project many points. World frame.
 struct Witness<'a> {
-    rot: Mat3,
-    trans: Vec3,
-    f: [f32; 4],
-    width: usize,
-    height: usize,
+    camera: Projection,
     depth: &'a [f32],
     labels: &'a [u8],
 }
 
 impl<'a> Witness<'a> {
     fn new(seen: &'a Observation, labels: &'a [u8]) -> Self {
-        let c = &seen.camera;
-        Self {
-            rot: c.camera_from_world.mat3().as_mat3(),
-            trans: c.camera_from_world.trans.as_vec3(),
-            f: [c.fx as f32, c.fy as f32, c.cx as f32, c.cy as f32],
-            width: c.width,
-            height: c.height,
-            depth: &seen.depth,
-            labels,
-        }
+        Self { camera: Projection::new(&seen.camera, &Pose::IDENTITY), depth: &seen.depth, labels }
     }
 }
 
@@ -152,12 +139,8 @@ fn for_surface(seen: &Observation, labels: &[u8], emit: &mut dyn FnMut(usize, DV
 fn ask(x: Vec3, witnesses: &[Witness], tolerance: f32) -> Verdict {
     let (mut through, mut hit) = (0, 0);
     for w in witnesses {
-        let x = w.rot * x + w.trans;
-        let (u, v) = (w.f[0] * x.x / x.z + w.f[2], w.f[1] * x.y / x.z + w.f[3]);
-        if !(x.z > 0.0 && u >= 0.0 && v >= 0.0 && u < w.width as f32 && v < w.height as f32) {
-            continue;
-        }
-        let i = v as usize * w.width + u as usize;
+        let x = w.camera.to_camera(x);
+        let Some(i) = w.camera.pixel(x) else { continue };
         let depth = w.depth[i];
         if w.labels[i] == BACKGROUND || depth > x.z + 2.0 * tolerance {
             through += 1;

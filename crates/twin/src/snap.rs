@@ -5,9 +5,9 @@
 //! show it in all states (quadrics as in dual contouring, Ju et al. 2002): onto a face, and into an edge where two faces meet.
 
 use crate::Observation;
+use crate::vertices::Glimpse;
 use glam::{Mat3, Vec3};
-use hingecast_geom::{Pose, TriMesh};
-use rayon::prelude::*;
+use hingecast_geom::TriMesh;
 
 /// Weight of staying where it is: a share of that of all planes, and a part of one plane seen face on.
 const STAY: [f32; 2] = [0.02, 0.05];
@@ -25,59 +25,37 @@ pub struct Pull {
     way: Vec3,
 }
 
-/// Adds the planes of `batch` that show part `part` within `reach` of its vertices.
-pub fn accumulate(
-    pulls: &mut [Pull],
-    mesh: &TriMesh,
-    normals: &[Vec3],
-    part: u8,
-    batch: &[Observation],
-    world_from_canonical: &[Pose],
-    reach: f32,
-) {
-    for (seen, pose) in batch.iter().zip(world_from_canonical) {
-        let camera_from_canonical = seen.camera.camera_from_world * *pose;
-        let (rot, trans) = (camera_from_canonical.mat3().as_mat3(), camera_from_canonical.trans.as_vec3());
-        let back = rot.transpose();
-        let c = &seen.camera;
-        let (fx, fy, cx, cy) = (c.fx as f32, c.fy as f32, c.cx as f32, c.cy as f32);
-        pulls.par_iter_mut().enumerate().with_min_len(1024).for_each(|(i, pull)| {
-            let x = rot * mesh.vertices[i] + trans;
-            let normal = rot * normals[i];
-            if !(x.z > 0.0 && normal.dot(x) < 0.0) {
-                return;
-            }
-            let (u, v) = (fx * x.x / x.z + cx, fy * x.y / x.z + cy);
-            if !(u >= 0.0 && v >= 0.0 && u < c.width as f32 && v < c.height as f32) {
-                return;
-            }
-            let Some((plane, bend)) = plane(seen, u as usize, v as usize, part) else { return };
-            // plane . X = 1 holds on it; it points away from the camera.
-            let scale = plane.length_recip();
-            let (m, r) = (plane * scale, (1.0 - plane.dot(x)) * scale);
-            let slant = -m.dot(x) / x.length();
-            let off = r / reach;
-            if -m.dot(normal) < ALIKE || off.abs() >= 1.0 {
-                return;
-            }
-            let sure = (1.0 - off * off) * (1.0 - off * off);
-            let w = slant * slant * sure / (1.0 + (bend / BENT).powi(2));
-            let m = back * m;
-            let o = [m.x * m.x, m.x * m.y, m.x * m.z, m.y * m.y, m.y * m.z, m.z * m.z];
-            pull.outer.iter_mut().zip(o).for_each(|(sum, o)| *sum += w * o);
-            pull.way += w * r * m;
-        });
+/// Adds the plane of a pixel of the vertex's part, if it lies within `reach` of the vertex.
+pub fn accumulate(pull: &mut Pull, g: &Glimpse, reach: f32) {
+    let x = g.x;
+    if !(g.normal.dot(x) < 0.0) {
+        return;
     }
+    let Some((plane, bend)) = plane(g.seen, g.pixel, g.part) else { return };
+    // plane . X = 1 holds on it; it points away from the camera.
+    let scale = plane.length_recip();
+    let (m, r) = (plane * scale, (1.0 - plane.dot(x)) * scale);
+    let slant = -m.dot(x) / x.length();
+    let off = r / reach;
+    if -m.dot(g.normal) < ALIKE || off.abs() >= 1.0 {
+        return;
+    }
+    let sure = (1.0 - off * off) * (1.0 - off * off);
+    let w = slant * slant * sure / (1.0 + (bend / BENT).powi(2));
+    let m = g.rot.transpose() * m;
+    let o = [m.x * m.x, m.x * m.y, m.x * m.z, m.y * m.y, m.y * m.z, m.z * m.z];
+    pull.outer.iter_mut().zip(o).for_each(|(sum, o)| *sum += w * o);
+    pull.way += w * r * m;
 }
 
 /// The plane n . X = 1 (camera frame) of a pixel of `part` whose four neighbours are the part's too, and how far the worst of them is
 /// off it, in pixels. Inverse depth is affine in the ray's slopes over a plane.
-fn plane(seen: &Observation, u: usize, v: usize, part: u8) -> Option<(Vec3, f32)> {
+fn plane(seen: &Observation, i: usize, part: u8) -> Option<(Vec3, f32)> {
     let c = &seen.camera;
+    let (u, v) = (i % c.width, i / c.width);
     if u == 0 || v == 0 || u + 1 >= c.width || v + 1 >= c.height {
         return None;
     }
-    let i = v * c.width + u;
     let inverse = |j: usize| (seen.labels[j] == part && seen.depth[j] > 0.0).then(|| 1.0 / seen.depth[j]);
     let (w, l, r) = (inverse(i)?, inverse(i - 1)?, inverse(i + 1)?);
     let (above, below) = (inverse(i - c.width)?, inverse(i + c.width)?);

@@ -8,9 +8,10 @@ use super::Labelled;
 use super::cloud::{BACKGROUND, DepthView, OBJECT};
 use super::discover::poses_of;
 use super::evidence::{Evidence, Motion};
+use super::labels::far_off_plane;
 use crate::icp::Surface;
 use glam::{DVec2, Vec3};
-use hingecast_geom::{KinematicTree, PointTree, Pose};
+use hingecast_geom::{KinematicTree, PointTree, Pose, Projection};
 use rayon::prelude::*;
 use std::collections::BTreeSet;
 
@@ -23,8 +24,6 @@ const FINER: f32 = 3.0;
 const AROUND: usize = 12;
 /// Depth within this many voxels is the same surface.
 const SAME: f32 = 0.3;
-/// A point off a sample's plane counts as farther away: squared distance plus this times that off the plane, squared.
-const OFF_PLANE: f32 = 8.0;
 /// States that must look through a point under its part, more than under the one that takes it.
 const CLEARLY: f32 = 1.0;
 /// Points that have a say in the label of one.
@@ -33,20 +32,20 @@ const BESIDE: usize = 8;
 /// A picture that is asked.
 struct Witness {
     view: DepthView,
-    world: Motion,
+    camera: Projection,
 }
 
 impl Witness {
     fn new(view: DepthView) -> Self {
-        let world = view.camera.camera_from_world.into();
-        Self { view, world }
+        let camera = Projection::new(&view.camera, &Pose::IDENTITY);
+        Self { view, camera }
     }
 
     /// How the four pixels around a world point answer: 1 if one of them measured it, -1 if all look through it, 0 else.
     fn ask(&self, x: Vec3, same: f32) -> i32 {
-        let (c, x) = (&self.view.camera, self.world.apply(x));
-        let u = c.fx as f32 * x.x / x.z + c.cx as f32 - 0.5;
-        let v = c.fy as f32 * x.y / x.z + c.cy as f32 - 0.5;
+        let (c, x) = (&self.view.camera, self.camera.to_camera(x));
+        let (u, v) = self.camera.uv(x);
+        let (u, v) = (u - 0.5, v - 0.5);
         if !(x.z > 0.0 && u >= 0.0 && v >= 0.0 && u + 1.0 < c.width as f32 && v + 1.0 < c.height as f32) {
             return 0;
         }
@@ -96,7 +95,6 @@ pub fn sharpen<E>(
             state,
             cloud,
             labels: &labels[state],
-            samples: PointTree::new(&cloud.points),
             asked: &asked,
             there: poses.iter().map(there).collect(),
             same: SAME * evidence.lattice.voxel,
@@ -116,7 +114,6 @@ struct Here<'a> {
     state: usize,
     cloud: &'a Surface,
     labels: &'a [u8],
-    samples: PointTree,
     /// State and its pictures.
     asked: &'a [(usize, Vec<Witness>)],
     /// World at an asked state from world here. [part][asked]
@@ -127,28 +124,26 @@ struct Here<'a> {
 impl Here<'_> {
     /// The part of a point; `beside`: its neighbours, asked for if need be.
     fn part_at(&self, x: Vec3, beside: impl Fn() -> Vec<Vec3>) -> u8 {
-        let near = self.samples.k_nearest(x, AROUND);
+        let near = self.cloud.k_nearest(x, AROUND);
         // That of the sample in whose plane it lies.
-        let far = |j: &u32| {
-            let gap = x - self.cloud.points[*j as usize];
-            gap.length_squared() + OFF_PLANE * self.cloud.normals[*j as usize].dot(gap).powi(2)
-        };
+        let far = |j: &u32| far_off_plane(x - self.cloud.points[*j as usize], self.cloud.normals[*j as usize]);
         let held = near.iter().min_by(|a, b| far(a).total_cmp(&far(b))).map_or(0, |j| self.labels[*j as usize]);
         // Only what is contradicted changes hands: a wall that is hidden elsewhere is met nowhere else either.
-        if self.ask(x, held).through == 0.0 {
+        let first = self.ask(x, held);
+        if first.through == 0.0 {
             return held;
         }
         let beside = beside();
-        let mean = |p: u8| {
+        let mean = |p: u8, own: Answers| {
             let sum = beside.iter().fold(Answers::default(), |sum, x| sum + self.ask(*x, p));
-            let (own, n) = (self.ask(x, p), beside.len().max(1) as f32);
+            let n = beside.len().max(1) as f32;
             Answers { met: 0.5 * (own.met + sum.met / n), through: 0.5 * (own.through + sum.through / n) }
         };
-        let own = mean(held);
+        let own = mean(held, first);
         let mut best = (own.met - 2.0 * own.through, held);
         let rivals: BTreeSet<u8> = near.iter().map(|j| self.labels[*j as usize]).filter(|p| *p != held).collect();
         for p in rivals {
-            let other = mean(p);
+            let other = mean(p, self.ask(x, p));
             let gain = other.met - 2.0 * other.through;
             let taken = own.through - other.through >= CLEARLY && other.met > own.met - CLEARLY;
             if taken && gain > best.0 {
@@ -197,10 +192,9 @@ fn said(views: &[Witness], x: Vec3, same: f32) -> Answers {
 
 /// Of every point of a state's cloud, whether one of another part is near.
 fn on_border(evidence: &Evidence, state: usize, labels: &[u8]) -> Vec<bool> {
-    let points = &evidence.clouds[state].points;
-    let tree = PointTree::new(points);
-    let other = |i: usize| tree.k_nearest(points[i], AROUND).iter().any(|j| labels[*j as usize] != labels[i]);
-    (0..points.len()).into_par_iter().map(other).collect()
+    let cloud = &evidence.clouds[state];
+    let other = |i: usize| cloud.k_nearest(cloud.points[i], AROUND).iter().any(|j| labels[*j as usize] != labels[i]);
+    (0..labels.len()).into_par_iter().map(other).collect()
 }
 
 /// The measured points around a state's border, one a fine cell.

@@ -26,6 +26,12 @@ const OWN: f32 = 0.3;
 /// Most that a neighbour speaks against a part where depth is sharp (a contradiction costs 2, a confirmation -1).
 const HEARD: f32 = 4.0;
 
+/// Square of the distance of two points, `gap` apart, that counts three times off the plane of one: two blades lie closer together than their
+/// samples.
+pub fn far_off_plane(gap: Vec3, normal: Vec3) -> f32 {
+    gap.length_squared() + 8.0 * normal.dot(gap).powi(2)
+}
+
 /// What it costs to give a sample to a part with this verdict.
 fn cost(v: &Verdict) -> f32 {
     2.0 * v.against.count_ones() as f32 - v.support.count_ones() as f32

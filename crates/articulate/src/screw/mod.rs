@@ -108,6 +108,12 @@ fn apply(rig: &[Pose], cameras: &mut [Vec<Pose>]) {
     }
 }
 
+/// The views from where their cameras are.
+fn corrected(mut views: Vec<DepthView>, cameras: &[Pose]) -> Vec<DepthView> {
+    views.iter_mut().zip(cameras).for_each(|(view, pose)| view.camera.camera_from_world = *pose);
+    views
+}
+
 /// Finds parts and joints. `extent`: box of the object over all states; `states(s)`: the views of state s.
 ///
 /// At most [`evidence::MOST_STATES`] states.
@@ -152,10 +158,7 @@ pub fn run<E: From<Cancelled>>(
             lattice,
             &mut |state| {
                 progress.report(state, n_states, "views of what stands still")?;
-                let mut views = states(state)?;
-                for (view, pose) in views.iter_mut().zip(&cameras[state]) {
-                    view.camera.camera_from_world = *pose;
-                }
+                let mut views = corrected(states(state)?, &cameras[state]);
                 steady::align(&mut views, &before, state, &labels[state], &base);
                 cameras[state] = views.iter().map(|v| v.camera.camera_from_world).collect();
                 Ok(views)
@@ -179,9 +182,7 @@ pub fn run<E: From<Cancelled>>(
     } else {
         borders::sharpen::<E>(&evidence, &settled.tree, &labels, &mut |state| {
             progress.report(state, n_states, "borders")?;
-            let mut views = states(state)?;
-            views.iter_mut().zip(&cameras[state]).for_each(|(view, pose)| view.camera.camera_from_world = *pose);
-            Ok(views)
+            Ok(corrected(states(state)?, &cameras[state]))
         })?
     };
     Ok(Found {

@@ -7,6 +7,7 @@
 use super::adopt::in_parent;
 use super::discover::poses_of;
 use super::evidence::{Evidence, Motion, Sample};
+use super::scan::EMPTY;
 use super::settle::{Owners, some};
 use super::space::Answer;
 use hingecast_geom::KinematicTree;
@@ -15,8 +16,6 @@ use rayon::prelude::*;
 /// How far beside the held value is looked, and in which steps, voxels that the part moves.
 const AROUND: f64 = 3.0;
 const STEP: f64 = 0.25;
-/// What a sample in space that was seen empty counts against one on a surface.
-const EMPTY: f32 = 1.5;
 /// Another value must be better by this share of the samples.
 const BETTER: f32 = 0.1;
 
@@ -27,8 +26,10 @@ pub fn look_beside(evidence: &Evidence, tree: &mut KinematicTree, owners: &Owner
         let joint = &tree.joints[j];
         let place = poses_of(tree, joint.parent, evidence.n_states());
         let members = owners.members(evidence, joint.child);
-        let Some(shown) = members.first().map(|m| m.shown) else { continue };
         let asking = some(members.iter().map(|m| m.sample), seed ^ j as u64);
+        if asking.is_empty() {
+            continue;
+        }
         let samples = in_parent(joint, &asking, &place);
         let mut reach: Vec<f64> = samples.iter().map(|s| joint.screw.distance(s.point.as_dvec3())).collect();
         reach.sort_by(f64::total_cmp);
@@ -41,9 +42,11 @@ pub fn look_beside(evidence: &Evidence, tree: &mut KinematicTree, owners: &Owner
                 agreement(evidence, t, &samples, &m)
             };
             let least = score(0) + BETTER;
-            let best = (-steps..=steps).map(|k| (score(k), k)).max_by(|a, b| a.0.total_cmp(&b.0).then(b.1.cmp(&a.1)));
+            let others = (-steps..=steps).filter(|k| *k != 0);
+            let best = others.map(|k| (score(k), k)).max_by(|a, b| a.0.total_cmp(&b.0).then(b.1.cmp(&a.1)));
             best.filter(|b| b.0 > least).map_or(held, |b| held + b.1 as f64 * step)
         };
+        let shown = owners.shown[joint.child];
         let values = (0..place.len()).into_par_iter();
         let values = values.map(|t| if shown >> t & 1 == 1 { beside(t) } else { joint.values[t] }).collect();
         tree.joints[j].values = values;

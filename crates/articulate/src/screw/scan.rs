@@ -15,7 +15,7 @@ pub struct Scan {
 }
 
 /// What entering space that was seen empty costs against meeting one surface.
-const EMPTY: f32 = 1.5;
+pub const EMPTY: f32 = 1.5;
 /// What surface counts that known parts explain, against 1 for surface that none does.
 #[derive(Clone, Copy)]
 pub struct Worth {

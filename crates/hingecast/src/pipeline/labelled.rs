@@ -4,6 +4,7 @@ use super::{Context, placed, screw, surface};
 use crate::failure::{Failure, Result};
 use glam::Vec3;
 use hingecast_articulate::screw::Labelled;
+use hingecast_articulate::screw::labels::far_off_plane;
 use hingecast_geom::ply::{read_vertices, write_float_vertices};
 use hingecast_geom::{KinematicTree, PointTree, Pose};
 use hingecast_twin::{BACKGROUND, UNKNOWN};
@@ -54,18 +55,13 @@ pub struct LabelledSurface {
 
 /// Samples that may say what part a point is.
 const ASKED: usize = 12;
-/// A sample off a point's plane counts as this many times farther away: two blades lie closer together than their samples.
-const OFF_PLANE: f32 = 3.0;
 
 impl LabelledSurface {
     /// The part of a point with this normal, if any sample lies within `reach` (squared).
     pub fn part_at(&self, x: Vec3, normal: Option<Vec3>, reach: f32) -> Option<u8> {
         let nearest = self.tree.nearest(x).filter(|n| n.1 < reach)?.0;
         let Some(n) = normal else { return Some(self.parts[nearest]) };
-        let far = |i: &u32| {
-            let gap = self.points[*i as usize] - x;
-            gap.length_squared() + (OFF_PLANE * OFF_PLANE - 1.0) * n.dot(gap).powi(2)
-        };
+        let far = |i: &u32| far_off_plane(self.points[*i as usize] - x, n);
         let near = self.tree.k_nearest(x, ASKED).into_iter();
         near.min_by(|a, b| far(a).total_cmp(&far(b))).map(|i| self.parts[i as usize])
     }
