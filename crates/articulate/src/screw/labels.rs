@@ -5,8 +5,10 @@
 //! cost = 2 contradictions - sum over states of the belief that the surface met belongs to this part. Beliefs are soft-mins of the
 //! costs, smoothed over neighbours of the same state that face alike, and both are computed in turns.
 
+use super::connected::{among, divide, pairs};
 use super::discover::poses_of;
 use super::evidence::{Evidence, Motion, Sample, Verdict};
+use super::settle::Owners;
 use super::space::Lattice;
 use crate::icp::Surface;
 use glam::Vec3;
@@ -63,7 +65,8 @@ pub fn label(evidence: &Evidence, verdicts: &[Vec<Verdict>]) -> Vec<u8> {
 }
 
 /// The part of every point of every state's cloud. [state][point]
-pub fn label_clouds(evidence: &Evidence, tree: &KinematicTree) -> Vec<Vec<u8>> {
+pub fn label_clouds(evidence: &Evidence, tree: &KinematicTree, owners: &Owners) -> Vec<Vec<u8>> {
+    let twins = pairs(evidence, tree, owners);
     let (n_states, n_parts) = (evidence.n_states(), tree.parts.len());
     let between: Vec<_> = (0..n_parts).map(|p| evidence.between(&poses_of(tree, p, n_states))).collect();
     // Poses that are off by a fraction of a voxel look like such steps.
@@ -113,7 +116,7 @@ pub fn label_clouds(evidence: &Evidence, tree: &KinematicTree) -> Vec<Vec<u8>> {
     let patched = |state: usize| {
         let mut labels = plain[state].clone();
         let cloud = &evidence.clouds[state];
-        whole_patches(&mut labels, cloud, &near[state], &verdicts[state], n_parts, evidence.lattice.voxel);
+        whole_patches(&mut labels, cloud, &near[state], &verdicts[state], &twins, evidence.lattice.voxel);
         labels
     };
     let patched: Vec<Vec<u8>> = (0..n_states).into_par_iter().map(patched).collect();
@@ -132,7 +135,17 @@ pub fn label_clouds(evidence: &Evidence, tree: &KinematicTree) -> Vec<Vec<u8>> {
         let keeps = |i: usize, was: u8, is: u8| was == is || agreeing(state, i, is) >= agreeing(state, i, was);
         both.map(|(i, (&was, &is))| if keeps(i, was, is) { is } else { was }).collect()
     };
-    (0..n_states).into_par_iter().map(settled).collect()
+    let mut labels: Vec<Vec<u8>> = (0..n_states).into_par_iter().map(settled).collect();
+    for pair in twins {
+        for (state, (labels, near)) in labels.iter_mut().zip(&near).enumerate() {
+            let which: Vec<usize> = (0..labels.len()).filter(|&i| pair.contains(&(labels[i] as usize))).collect();
+            let points: Vec<Sample> = which.iter().map(|&i| Sample::of(&evidence.clouds[state], state, i)).collect();
+            let near: Vec<[u32; NEAR]> = near.iter().map(|n| n.map(|(j, _)| j)).collect();
+            let divided = divide(evidence, tree, pair, &points, &among(&which, &near));
+            which.iter().zip(divided).for_each(|(&i, part)| labels[i] = part);
+        }
+    }
+    labels
 }
 
 /// A flat patch has at least this many samples.
@@ -144,9 +157,19 @@ const SOILED: f32 = 0.10;
 const BEGUN: f32 = 0.3;
 
 /// A connected flat patch that one part alone can own without contradictions is that part's. The wall of a drawer slides in its own
-/// plane: deep inside it could stand still as well, but where it sticks out it cannot, and it is one wall.
-fn whole_patches(labels: &mut [u8], cloud: &Surface, near: &[Near], verdicts: &[Verdict], n_parts: usize, voxel: f32) {
+/// plane: deep inside it could stand still as well, but where it sticks out it cannot, and it is one wall. `twins`: pairs of parts that
+/// moved nearly alike and count as one here.
+fn whole_patches(
+    labels: &mut [u8],
+    cloud: &Surface,
+    near: &[Near],
+    verdicts: &[Verdict],
+    twins: &[[usize; 2]],
+    voxel: f32,
+) {
     let (points, normals) = (&cloud.points, &cloud.normals);
+    let n_parts = verdicts.len() / labels.len().max(1);
+    let one = |p: usize, q: usize| p == q || twins.contains(&[p.min(q), p.max(q)]);
     let flat = |i: usize, j: usize| {
         let gap = points[j] - points[i];
         normals[i].dot(normals[j]) > 0.97 && gap.length() < 2.0 * voxel && normals[i].dot(gap).abs() < 0.3 * voxel
@@ -178,11 +201,13 @@ fn whole_patches(labels: &mut [u8], cloud: &Surface, near: &[Near], verdicts: &[
         };
         let shares: Vec<f32> = (0..n_parts).map(soiled).collect();
         let clean: Vec<usize> = (0..n_parts).filter(|&p| shares[p] < SOILED).collect();
-        let begun = |p: usize| patch.iter().filter(|&&i| labels[i] as usize == p).count() as f32;
-        if let [owner] = clean[..]
+        let begun = |p: usize| patch.iter().filter(|&&i| one(labels[i] as usize, p)).count() as f32;
+        if let Some(&owner) = clean.first()
+            && clean.iter().all(|p| one(owner, *p))
             && shares[owner] < CLEAN
             && begun(owner) > BEGUN * patch.len() as f32
         {
+            patch.retain(|&i| !one(labels[i] as usize, owner));
             patch.iter().for_each(|&i| labels[i] = owner as u8);
         }
     }

@@ -12,6 +12,8 @@
 //! hidden         states that do not show a part
 //! nearby         values a voxel or two beside the right one
 //! settle         states' frames, all joints together (refine, twist)
+//! askew          axes tried along faces and other axes, now that all parts are known (whole: how well a tree explains what moved)
+//! alike          parts that moved nearly alike and were found as one (halves: the values of both; connected: who belongs to which)
 //! straight       axes along their part's faces, where that explains as much
 //! labels         which part a sample belongs to
 //! borders        the same where parts meet, pixel by pixel
@@ -22,14 +24,18 @@
 //! ```
 
 mod adopt;
+mod alike;
+mod askew;
 mod borders;
 pub mod cameras;
 mod chains;
 pub mod cloud;
+mod connected;
 pub mod discover;
 pub mod doubts;
 pub mod evidence;
 mod finals;
+mod halves;
 mod hidden;
 mod hypotheses;
 mod information;
@@ -47,6 +53,7 @@ pub mod space;
 mod steady;
 mod straight;
 mod twist;
+mod whole;
 
 use cloud::DepthView;
 use evidence::Evidence;
@@ -148,7 +155,7 @@ pub fn run<E: From<Cancelled>>(
     progress.report(0, 1, "refining")?;
     let mut settled = settle::settle(&mut evidence, &discovery, seed);
     apply(&settled.rig, &mut cameras);
-    let mut labels = labels::label_clouds(&evidence, &settled.tree);
+    let mut labels = labels::label_clouds(&evidence, &settled.tree, &settled.owners);
     let noisy = evidence.is_noisy();
     if config.align_cameras && noisy {
         let base = steady::base(&evidence, &labels);
@@ -169,7 +176,7 @@ pub fn run<E: From<Cancelled>>(
         let found = settle::again(&evidence, settled.tree, discovery.cost);
         settled = settle::settle(&mut evidence, &found, seed);
         apply(&settled.rig, &mut cameras);
-        labels = labels::label_clouds(&evidence, &settled.tree);
+        labels = labels::label_clouds(&evidence, &settled.tree, &settled.owners);
     }
     let information = if noisy { information::of_parts(&evidence, &labels, &settled) } else { Vec::new() };
     let (doubts, certainty) = doubts::doubts(&evidence, &settled, &labels, seed);

@@ -7,10 +7,9 @@
 use super::adopt::in_parent;
 use super::discover::poses_of;
 use super::evidence::{Evidence, Motion, Sample};
-use super::scan::EMPTY;
 use super::settle::{Owners, some};
-use super::space::Answer;
-use hingecast_geom::KinematicTree;
+use super::whole::word;
+use hingecast_geom::{KinematicTree, Screw};
 use rayon::prelude::*;
 
 /// How far beside the held value is looked, and in which steps, voxels that the part moves.
@@ -21,7 +20,6 @@ const BETTER: f32 = 0.1;
 
 /// Corrects the values of all joints.
 pub fn look_beside(evidence: &Evidence, tree: &mut KinematicTree, owners: &Owners, seed: u64) {
-    let steps = (AROUND / STEP) as i32;
     for j in 0..tree.joints.len() {
         let joint = &tree.joints[j];
         let place = poses_of(tree, joint.parent, evidence.n_states());
@@ -31,20 +29,14 @@ pub fn look_beside(evidence: &Evidence, tree: &mut KinematicTree, owners: &Owner
             continue;
         }
         let samples = in_parent(joint, &asking, &place);
-        let mut reach: Vec<f64> = samples.iter().map(|s| joint.screw.distance(s.point.as_dvec3())).collect();
-        reach.sort_by(f64::total_cmp);
-        let reach = if joint.screw.kind.turns() { reach[reach.len() * 9 / 10] } else { 1.0 };
-        let step = STEP * evidence.lattice.voxel as f64 / reach.max(1e-9);
+        let offsets = offsets(evidence, &joint.screw, &samples);
         let beside = |t: usize| {
             let held = joint.values[t];
-            let score = |k: i32| {
-                let m = Motion::from(place[t] * joint.screw.motion(held + k as f64 * step));
-                agreement(evidence, t, &samples, &m)
-            };
-            let least = score(0) + BETTER;
-            let others = (-steps..=steps).filter(|k| *k != 0);
-            let best = others.map(|k| (score(k), k)).max_by(|a, b| a.0.total_cmp(&b.0).then(b.1.cmp(&a.1)));
-            best.filter(|b| b.0 > least).map_or(held, |b| held + b.1 as f64 * step)
+            let score = |q: f64| agreement(evidence, t, &samples, &Motion::from(place[t] * joint.screw.motion(q)));
+            // Of equals the first.
+            let others = offsets.iter().map(|o| (score(held + o), held + o));
+            let best = others.reduce(|a, b| if b.0 > a.0 { b } else { a });
+            best.filter(|b| b.0 > score(held) + BETTER).map_or(held, |b| b.1)
         };
         let shown = owners.shown[joint.child];
         let values = (0..place.len()).into_par_iter();
@@ -53,13 +45,19 @@ pub fn look_beside(evidence: &Evidence, tree: &mut KinematicTree, owners: &Owner
     }
 }
 
-/// How near the samples of other states come to surface that faces the same way, 1 on it, minus what enters empty space; their mean.
-fn agreement(evidence: &Evidence, t: usize, samples: &[Sample], m: &Motion) -> f32 {
+/// Changes of a value that move most `samples` (in the screw's frame) by up to three voxels, without none.
+pub fn offsets(evidence: &Evidence, screw: &Screw, samples: &[Sample]) -> Vec<f64> {
+    let mut reach: Vec<f64> = samples.iter().map(|s| screw.distance(s.point.as_dvec3())).collect();
+    reach.sort_by(f64::total_cmp);
+    let reach = if screw.kind.turns() { reach[reach.len() * 9 / 10] } else { 1.0 };
+    let step = STEP * evidence.lattice.voxel as f64 / reach.max(1e-9);
+    let steps = (AROUND / STEP) as i32;
+    (-steps..=steps).filter(|k| *k != 0).map(|k| k as f64 * step).collect()
+}
+
+/// What state `t` says about samples of other states in the mean.
+pub fn agreement(evidence: &Evidence, t: usize, samples: &[Sample], m: &Motion) -> f32 {
     let others = samples.iter().filter(|s| s.state != t);
-    let (sum, n) = others.fold((0.0, 0), |(sum, n), s| {
-        let (x, normal) = (m.apply(s.point), m.rot * s.normal);
-        let empty = matches!(evidence.spaces[t].ask(x, normal), Answer::Free);
-        (sum + if empty { -EMPTY } else { evidence.nearness(t, x, normal) }, n + 1)
-    });
+    let (sum, n) = others.fold((0.0, 0), |(sum, n), s| (sum + word(evidence, t, s, m), n + 1));
     sum / n.max(1) as f32
 }

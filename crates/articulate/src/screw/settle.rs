@@ -12,6 +12,7 @@ use super::labels::label;
 use super::nearby::look_beside;
 use super::refine::{Member, Report, Settings, refine};
 use super::straight::straighten;
+use super::{alike, askew};
 use crate::icp::{self, Surface};
 use glam::Vec3;
 use hingecast_geom::{KinematicTree, Pose};
@@ -83,6 +84,9 @@ pub fn settle(evidence: &mut Evidence, found: &Discovery, seed: u64) -> Settled 
         states.iter().for_each(|(t, _)| shown[joint.child] &= !(1 << t));
     }
     let mut owners = Owners { labels, shown };
+    if askew::turn(evidence, &mut tree, &owners, &verdicts[0], seed) {
+        owners.labels = label(evidence, &judge_all(evidence, &tree));
+    }
     slides(evidence, &mut tree, &owners, seed);
     let free = vec![true; tree.joints.len()];
     let noisy = evidence.is_noisy();
@@ -105,6 +109,14 @@ pub fn settle(evidence: &mut Evidence, found: &Discovery, seed: u64) -> Settled 
         hidden::hold(&mut tree, &hidden);
         verdicts = judge_all(evidence, &tree);
         owners.labels = label(evidence, &verdicts);
+    }
+    if alike::split(evidence, &mut tree, &mut owners, &verdicts[0], seed) {
+        // Not labelled by the grid again: that takes the new parts for one.
+        let members: Vec<Member> = owners.all(evidence).filter(|m| m.part != 0).collect();
+        let settings = Settings { gates: [0.6 * voxel, 0.3 * voxel], rounds: 6, partners: 6 };
+        report = refine(evidence, &mut tree, &members, &vec![true; tree.joints.len()], &settings, seed ^ 3);
+        straighten(evidence, &mut tree, &owners, seed);
+        verdicts = judge_all(evidence, &tree);
     }
     let n = evidence.samples.len();
     let unexplained = (0..n).filter(|&i| verdicts.iter().all(|v| v[i].against != 0)).count() as f64 / n.max(1) as f64;
@@ -185,20 +197,25 @@ fn prune(evidence: &Evidence, tree: &mut KinematicTree, cost: Cost) -> Vec<Vec<V
         let leaf = |p: &usize| !tree.joints.iter().any(|j| j.parent == *p);
         let weakest = (1..tree.parts.len()).filter(leaf).map(|p| (gain(p), p)).min_by(|a, b| a.0.total_cmp(&b.0));
         let Some((_, part)) = weakest.filter(|w| w.0 < 0.0) else { return verdicts };
-        tree.joints.retain(|j| j.child != part);
-        for joint in &mut tree.joints {
-            joint.child -= usize::from(joint.child > part);
-            joint.parent -= usize::from(joint.parent > part);
-        }
-        tree.parts.remove(part);
-        for (k, name) in tree.parts.iter_mut().enumerate().skip(1) {
-            *name = format!("part_{k}");
-        }
-        for joint in &mut tree.joints {
-            joint.name = format!("joint_{}", joint.child);
-        }
+        *tree = without(tree, part);
         verdicts.remove(part);
     }
+}
+
+/// The tree without a part that carries no other, the others counted anew.
+pub fn without(tree: &KinematicTree, part: usize) -> KinematicTree {
+    let mut tree = tree.clone();
+    tree.joints.retain(|j| j.child != part);
+    for joint in &mut tree.joints {
+        joint.child -= usize::from(joint.child > part);
+        joint.parent -= usize::from(joint.parent > part);
+        joint.name = format!("joint_{}", joint.child);
+    }
+    tree.parts.remove(part);
+    for (k, name) in tree.parts.iter_mut().enumerate().skip(1) {
+        *name = format!("part_{k}");
+    }
+    tree
 }
 
 /// Corrections that bring the base of every state onto the base of all others; their mean is nothing.

@@ -1,0 +1,94 @@
+//! Which of two parts that moved nearly alike a point belongs to.
+//!
+//! The walls of a drawer slide in their own plane and fit the motion of the drawer beside it as well. Its front and its back know, and the rest
+//! belongs to what it hangs on.
+
+use super::discover::poses_of;
+use super::evidence::{Evidence, Motion, Sample};
+use super::settle::Owners;
+use super::whole::word;
+use hingecast_geom::KinematicTree;
+use rayon::prelude::*;
+
+/// Parts that never are farther apart than this, voxels, moved nearly alike.
+const ALIKE: f32 = 3.0;
+/// Samples of a part that tell.
+const ASKED: usize = 50;
+/// Rounds of smoothing over neighbours.
+const SMOOTHING: usize = 3;
+/// A point knows where it belongs if one part explains it better by this.
+const SURE: f32 = 0.3;
+
+/// How much better the second of two motions explains a sample, by states where they differ along its normal. `from[k][t]`: world at t from
+/// world at the sample's state.
+pub fn lead(evidence: &Evidence, s: &Sample, from: [&[Motion]; 2]) -> f32 {
+    let differ = |(a, b): (&Motion, &Motion)| (a.rot * s.normal).dot(b.apply(s.point) - a.apply(s.point)).abs();
+    let tells = |t: &usize| *t != s.state && differ((&from[0][*t], &from[1][*t])) > evidence.tolerance;
+    let states = (0..from[0].len()).filter(tells);
+    states.map(|t| word(evidence, t, s, &from[1][t]) - word(evidence, t, s, &from[0][t])).sum()
+}
+
+/// Of `parts`, the one that each of `points` belongs to, where both moved nearly alike. `neighbours[i]`: points near the i-th.
+pub fn divide(
+    evidence: &Evidence,
+    tree: &KinematicTree,
+    parts: [usize; 2],
+    points: &[Sample],
+    neighbours: &[Vec<u32>],
+) -> Vec<u8> {
+    let between = parts.map(|p| evidence.between(&poses_of(tree, p, evidence.n_states())));
+    let lead = |s: &Sample| lead(evidence, s, [0, 1].map(|k: usize| &between[k][s.state][..]));
+    let mut leads: Vec<f32> = points.par_iter().map(lead).collect();
+    for _ in 0..SMOOTHING {
+        let mean = |i: usize| {
+            let near = &neighbours[i];
+            let sum: f32 = near.iter().map(|&k| leads[k as usize]).sum();
+            0.4 * leads[i] + 0.6 * sum / near.len().max(1) as f32
+        };
+        leads = (0..leads.len()).into_par_iter().map(mean).collect();
+    }
+    let mut reached: Vec<usize> = (0..leads.len()).filter(|&i| leads[i].abs() > SURE).collect();
+    let mut known: Vec<bool> = leads.iter().map(|lead| lead.abs() > SURE).collect();
+    let mut next = 0;
+    while next < reached.len() {
+        let i = reached[next];
+        next += 1;
+        for &k in &neighbours[i] {
+            let k = k as usize;
+            if !std::mem::replace(&mut known[k], true) {
+                leads[k] = leads[i];
+                reached.push(k);
+            }
+        }
+    }
+    leads.iter().map(|lead| parts[usize::from(*lead > 0.0)] as u8).collect()
+}
+
+/// The neighbours of the points `which` that are among these, counted as they are there.
+pub fn among(which: &[usize], neighbours: &[impl AsRef<[u32]>]) -> Vec<Vec<u32>> {
+    let mut place = vec![u32::MAX; neighbours.len()];
+    which.iter().zip(0..).for_each(|(&i, k)| place[i] = k);
+    let of = |&i: &usize| {
+        let near = neighbours[i].as_ref().iter().map(|&j| place[j as usize]);
+        near.filter(|k| *k != u32::MAX).collect()
+    };
+    which.iter().map(of).collect()
+}
+
+/// Pairs of moving parts, the lower first, that are never farther apart than three voxels.
+pub fn pairs(evidence: &Evidence, tree: &KinematicTree, owners: &Owners) -> Vec<[usize; 2]> {
+    let between: Vec<_> =
+        (0..tree.parts.len()).map(|p| evidence.between(&poses_of(tree, p, evidence.n_states()))).collect();
+    let far = |s: &Sample, [p, q]: [usize; 2]| {
+        let (p, q) = (&between[p][s.state], &between[q][s.state]);
+        let apart = |(p, q): (&Motion, &Motion)| p.apply(s.point).distance(q.apply(s.point));
+        p.iter().zip(q).any(|motions| apart(motions) > ALIKE * evidence.lattice.voxel)
+    };
+    let own = |p: usize| owners.labels.iter().zip(&evidence.samples).filter(move |(l, _)| **l as usize == p);
+    let alike = |pair: &[usize; 2]| {
+        let stride = own(pair[0]).count().div_ceil(ASKED).max(1);
+        !own(pair[0]).step_by(stride).any(|(_, s)| far(s, *pair))
+    };
+    let all = (1..tree.parts.len()).flat_map(|p| (p + 1..tree.parts.len()).map(move |q| [p, q]));
+    all.filter(alike).collect()
+}
