@@ -114,7 +114,8 @@ pub fn settle(evidence: &mut Evidence, found: &Discovery, seed: u64) -> Settled 
         // Not labelled by the grid again: that takes the new parts for one.
         let members: Vec<Member> = owners.all(evidence).filter(|m| m.part != 0).collect();
         let settings = Settings { gates: [0.6 * voxel, 0.3 * voxel], rounds: 6, partners: 6 };
-        report = refine(evidence, &mut tree, &members, &vec![true; tree.joints.len()], &settings, seed ^ 3);
+        let free = vec![true; tree.joints.len()];
+        report = refine(evidence, &mut tree, &members, &free, &settings, seed ^ 3);
         straighten(evidence, &mut tree, &owners, seed);
         verdicts = judge_all(evidence, &tree);
     }
