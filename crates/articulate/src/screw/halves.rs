@@ -159,8 +159,11 @@ impl Part<'_> {
         })
     }
 
-    /// The value near one of two that state `t` agrees with best; the first unless another is better.
+    /// The value near one of two that state `t` agrees with best; the first unless another is better, or if the state hides the part.
     fn best(&self, t: usize, held: [f64; 2], samples: &[Sample]) -> f64 {
+        if self.shown >> t & 1 == 0 {
+            return held[0];
+        }
         let asked = |q: f64| (agreement(self.evidence, t, samples, &self.at(t, q)), q);
         let near = held.iter().flat_map(|v| [0.0].iter().chain(&self.offsets).map(move |o| v + o));
         near.map(asked).reduce(|a, b| if b.0 > a.0 + 1e-4 { b } else { a }).expect("some values").1
