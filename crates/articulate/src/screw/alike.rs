@@ -4,7 +4,7 @@
 //! part want two values of its joint ([`super::halves`]) and that explains the recording clearly better, the part is two.
 
 use super::connected::{among, divide};
-use super::discover::poses_of;
+use super::discover::motions_of;
 use super::evidence::{Evidence, Sample, Verdict};
 use super::halves::halves;
 use super::refine::{Member, Settings, refine};
@@ -12,7 +12,6 @@ use super::settle::{Owners, without};
 use super::whole::{Whole, words};
 use hingecast_geom::{Joint, KinematicTree};
 use rayon::prelude::*;
-use std::cmp::Ordering;
 
 /// Each of two parts has at least this share of the samples.
 const SHARE: f64 = 0.1;
@@ -27,31 +26,68 @@ pub fn split(evidence: &Evidence, tree: &mut KinematicTree, owners: &mut Owners,
     let whole = Whole::new(evidence, still, seed);
     let (mut j, mut any) = (0, false);
     while j < tree.joints.len() {
-        let leaf = tree.joints.iter().all(|o| o.parent != tree.joints[j].child);
-        let values = if leaf { halves(evidence, tree, owners, j, seed) } else { None };
-        let two = values.and_then(|values| apart(evidence, tree, owners, j, values, &whole, seed));
+        let (bare, own, at) = without_children(tree, owners, j);
+        let values = halves(evidence, &bare, &own, at, seed);
+        let held = || whole.nats(evidence, tree);
+        let two = values.and_then(|values| apart(evidence, &bare, &own, at, values, (&whole, held()), seed));
         let Some((other, labels)) = two else {
             j += 1;
             continue;
         };
-        (*tree, owners.labels) = (other, labels);
-        owners.shown.push(owners.shown[tree.joints[j].child]);
+        let mut shown = own.shown;
+        shown.push(shown[bare.joints[at].child]);
+        (*tree, *owners) = (other, Owners { labels, shown });
         any = true;
-        if superfluous(evidence, tree, owners, &whole) {
-            j = 0;
-        }
+        let dropped = superfluous(evidence, tree, owners, &whole);
+        j = if dropped || at != j { 0 } else { j };
     }
     any
 }
 
-/// The tree with the part of joint `j` in two, with these values, and all labels; none if one part explains nearly as much.
+/// The tree without what hangs on the part of joint `j`, whose samples become that part's, and where that joint is then. A second part, found
+/// as if it hung on the first, is no third.
+fn without_children(tree: &KinematicTree, owners: &Owners, j: usize) -> (KinematicTree, Owners, usize) {
+    let (mut out, mut child) = (tree.clone(), tree.joints[j].child);
+    let mut own = Owners { labels: owners.labels.clone(), shown: owners.shown.clone() };
+    let below = |tree: &KinematicTree, child: usize| {
+        let leaf = |p: &usize| tree.joints.iter().all(|o| o.parent != *p);
+        let hangs = |p: &usize| tree.ancestry(*p).iter().any(|k| tree.joints[*k].child == child);
+        (1..tree.parts.len()).filter(leaf).find(|p| *p != child && hangs(p))
+    };
+    while let Some(part) = below(&out, child) {
+        out = drop_part(&out, &mut own, part, |_| child as u8);
+        child -= usize::from(child > part);
+    }
+    let at = out.joints.iter().position(|o| o.child == child).expect("it stays");
+    (out, own, at)
+}
+
+/// The tree without a part that carries no other; `goes(i)`: the part, as counted before, that its i-th sample goes to.
+fn drop_part(
+    tree: &KinematicTree,
+    owners: &mut Owners,
+    part: usize,
+    goes: impl Fn(usize) -> u8 + Sync,
+) -> KinematicTree {
+    owners.shown.remove(part);
+    owners.labels.par_iter_mut().enumerate().for_each(|(i, l)| {
+        if *l as usize == part {
+            *l = goes(i);
+        }
+        *l -= u8::from(*l as usize > part);
+    });
+    without(tree, part)
+}
+
+/// The tree with the part of joint `j` in two, with these values, and all labels; none unless that explains the recording clearly better
+/// than the `held` nats of before.
 fn apart(
     evidence: &Evidence,
     tree: &KinematicTree,
     owners: &Owners,
     j: usize,
     [values, others]: [Vec<f64>; 2],
-    whole: &Whole,
+    (whole, held): (&Whole, f64),
     seed: u64,
 ) -> Option<(KinematicTree, Vec<u8>)> {
     let (mut out, child, part) = (tree.clone(), tree.joints[j].child, tree.parts.len());
@@ -77,7 +113,6 @@ fn apart(
     if share.min(1.0 - share) < SHARE {
         return None;
     }
-    let held = whole.nats(evidence, tree);
     let own = held - whole.nats(evidence, &without(tree, child));
     if whole.nats(evidence, &out) < held + BETTER.max(GAIN * own) {
         return None;
@@ -97,18 +132,12 @@ fn superfluous(evidence: &Evidence, tree: &mut KinematicTree, owners: &mut Owner
         let least = (1..tree.parts.len()).filter(leaf).map(|p| (loss(p), p)).min_by(|a, b| a.0.total_cmp(&b.0));
         let Some((_, part)) = least.filter(|l| l.0 < WORTH) else { return any };
         any = true;
-        *tree = without(tree, part);
-        owners.shown.remove(part);
-        let between: Vec<_> =
-            (0..tree.parts.len()).map(|p| evidence.between(&poses_of(tree, p, evidence.n_states()))).collect();
-        let best = |s: &Sample| {
-            let each = between.iter().map(|b| words(evidence, s, &b[s.state])).enumerate();
+        let between = motions_of(evidence, tree);
+        let best = |i: usize| {
+            let s = &evidence.samples[i];
+            let each = between.iter().map(|b| words(evidence, s, &b[s.state])).enumerate().filter(|(p, _)| *p != part);
             each.fold((f32::NEG_INFINITY, 0), |best, (p, w)| if w > best.0 { (w, p) } else { best }).1 as u8
         };
-        owners.labels.par_iter_mut().zip(&evidence.samples).for_each(|(l, s)| match (*l as usize).cmp(&part) {
-            Ordering::Less => {}
-            Ordering::Equal => *l = best(s),
-            Ordering::Greater => *l -= 1,
-        });
+        *tree = drop_part(tree, owners, part, best);
     }
 }

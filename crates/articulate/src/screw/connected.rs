@@ -3,7 +3,7 @@
 //! The walls of a drawer slide in their own plane and fit the motion of the drawer beside it as well. Its front and its back know, and the rest
 //! belongs to what it hangs on.
 
-use super::discover::poses_of;
+use super::discover::{motions_of, poses_of};
 use super::evidence::{Evidence, Motion, Sample};
 use super::settle::Owners;
 use super::whole::word;
@@ -77,8 +77,7 @@ pub fn among(which: &[usize], neighbours: &[impl AsRef<[u32]>]) -> Vec<Vec<u32>>
 
 /// Pairs of moving parts, the lower first, that are never farther apart than three voxels.
 pub fn pairs(evidence: &Evidence, tree: &KinematicTree, owners: &Owners) -> Vec<[usize; 2]> {
-    let between: Vec<_> =
-        (0..tree.parts.len()).map(|p| evidence.between(&poses_of(tree, p, evidence.n_states()))).collect();
+    let between = motions_of(evidence, tree);
     let far = |s: &Sample, [p, q]: [usize; 2]| {
         let (p, q) = (&between[p][s.state], &between[q][s.state]);
         let apart = |(p, q): (&Motion, &Motion)| p.apply(s.point).distance(q.apply(s.point));

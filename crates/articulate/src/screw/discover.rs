@@ -152,6 +152,11 @@ pub fn poses_of(tree: &KinematicTree, part: usize, n_states: usize) -> Vec<Pose>
     (0..n_states).map(|s| tree.poses_at(s)[part]).collect()
 }
 
+/// World at state t from world at state a, for every part. [part][a][t]
+pub fn motions_of(evidence: &Evidence, tree: &KinematicTree) -> Vec<Vec<Vec<Motion>>> {
+    (0..tree.parts.len()).map(|p| evidence.between(&poses_of(tree, p, evidence.n_states()))).collect()
+}
+
 /// Samples that every part contradicts.
 fn open_samples(verdicts: &[Vec<Verdict>]) -> Vec<usize> {
     (0..verdicts[0].len()).filter(|&i| contradictions(verdicts, i) > 0.0).collect()

@@ -6,7 +6,7 @@
 //! costs, smoothed over neighbours of the same state that face alike, and both are computed in turns.
 
 use super::connected::{among, divide, pairs};
-use super::discover::poses_of;
+use super::discover::motions_of;
 use super::evidence::{Evidence, Motion, Sample, Verdict};
 use super::settle::Owners;
 use super::space::Lattice;
@@ -68,7 +68,7 @@ pub fn label(evidence: &Evidence, verdicts: &[Vec<Verdict>]) -> Vec<u8> {
 pub fn label_clouds(evidence: &Evidence, tree: &KinematicTree, owners: &Owners) -> Vec<Vec<u8>> {
     let twins = pairs(evidence, tree, owners);
     let (n_states, n_parts) = (evidence.n_states(), tree.parts.len());
-    let between: Vec<_> = (0..n_parts).map(|p| evidence.between(&poses_of(tree, p, n_states))).collect();
+    let between = motions_of(evidence, tree);
     // Poses that are off by a fraction of a voxel look like such steps.
     let sharp = !evidence.is_noisy();
     let heard = if sharp { HEARD } else { f32::INFINITY };

@@ -3,7 +3,7 @@
 //! E = sum over samples of the best part's sum over states of 1 / (1 + (h / tolerance)^2), h the height over the surface that the state measured
 //! where the part's motion puts the sample; -1.5 where it was seen empty. On the grid a motion that is a voxel off is as good as the right one.
 
-use super::discover::poses_of;
+use super::discover::motions_of;
 use super::doubts::CORRELATED;
 use super::evidence::{Evidence, Motion, Sample, Verdict};
 use super::scan::EMPTY;
@@ -45,8 +45,7 @@ impl Whole {
 
     /// E of a tree, in nats.
     pub fn nats(&self, evidence: &Evidence, tree: &KinematicTree) -> f64 {
-        let between: Vec<_> =
-            (0..tree.parts.len()).map(|p| evidence.between(&poses_of(tree, p, evidence.n_states()))).collect();
+        let between = motions_of(evidence, tree);
         let best = |s: &Sample| {
             let each = between.iter().map(|b| words(evidence, s, &b[s.state]));
             each.fold(f32::NEG_INFINITY, f32::max)
