@@ -10,8 +10,8 @@ use super::whole::word;
 use hingecast_geom::KinematicTree;
 use rayon::prelude::*;
 
-/// Parts that never are farther apart than this, voxels, moved nearly alike.
-const ALIKE: f32 = 3.0;
+/// Parts that never are farther apart than this, voxels, moved nearly alike: twice as far as values are sought beside one between them.
+const ALIKE: f32 = 6.0;
 /// Samples of a part that tell.
 const ASKED: usize = 50;
 /// Rounds of smoothing over neighbours.
@@ -75,7 +75,7 @@ pub fn among(which: &[usize], neighbours: &[impl AsRef<[u32]>]) -> Vec<Vec<u32>>
     which.iter().map(of).collect()
 }
 
-/// Pairs of moving parts, the lower first, that are never farther apart than three voxels.
+/// Pairs of moving parts, the lower first, that are never farther apart than six voxels.
 pub fn pairs(evidence: &Evidence, tree: &KinematicTree, owners: &Owners) -> Vec<[usize; 2]> {
     let between = motions_of(evidence, tree);
     let far = |s: &Sample, [p, q]: [usize; 2]| {
