@@ -8,7 +8,7 @@ use super::discover::motions_of;
 use super::evidence::{Evidence, Sample, Verdict};
 use super::halves::halves;
 use super::refine::{Member, Settings, refine};
-use super::settle::{Owners, without};
+use super::settle::{Owners, leaves, without};
 use super::whole::{Whole, words};
 use hingecast_geom::{Joint, KinematicTree};
 use rayon::prelude::*;
@@ -48,11 +48,10 @@ pub fn split(evidence: &Evidence, tree: &mut KinematicTree, owners: &mut Owners,
 /// as if it hung on the first, is no third.
 fn without_children(tree: &KinematicTree, owners: &Owners, j: usize) -> (KinematicTree, Owners, usize) {
     let (mut out, mut child) = (tree.clone(), tree.joints[j].child);
-    let mut own = Owners { labels: owners.labels.clone(), shown: owners.shown.clone() };
+    let mut own = owners.clone();
     let below = |tree: &KinematicTree, child: usize| {
-        let leaf = |p: &usize| tree.joints.iter().all(|o| o.parent != *p);
         let hangs = |p: &usize| tree.ancestry(*p).iter().any(|k| tree.joints[*k].child == child);
-        (1..tree.parts.len()).filter(leaf).find(|p| *p != child && hangs(p))
+        leaves(tree).find(|p| *p != child && hangs(p))
     };
     while let Some(part) = below(&out, child) {
         out = drop_part(&out, &mut own, part, |_| child as u8);
@@ -127,9 +126,8 @@ fn superfluous(evidence: &Evidence, tree: &mut KinematicTree, owners: &mut Owner
     let mut any = false;
     loop {
         let held = whole.nats(evidence, tree);
-        let leaf = |p: &usize| tree.joints.iter().all(|j| j.parent != *p);
         let loss = |p: usize| held - whole.nats(evidence, &without(tree, p));
-        let least = (1..tree.parts.len()).filter(leaf).map(|p| (loss(p), p)).min_by(|a, b| a.0.total_cmp(&b.0));
+        let least = leaves(tree).map(|p| (loss(p), p)).min_by(|a, b| a.0.total_cmp(&b.0));
         let Some((_, part)) = least.filter(|l| l.0 < WORTH) else { return any };
         any = true;
         let between = motions_of(evidence, tree);

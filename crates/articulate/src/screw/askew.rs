@@ -23,12 +23,14 @@ const BETTER: f64 = 3.0;
 /// Whether any was turned.
 pub fn turn(evidence: &mut Evidence, tree: &mut KinematicTree, owners: &Owners, still: &[Verdict], seed: u64) -> bool {
     let whole = Whole::new(evidence, still, seed);
-    let mut any = false;
+    let (mut any, mut held) = (false, None);
     for j in 0..tree.joints.len() {
         for axis in directions(evidence, tree, owners, j) {
             let other = along(evidence, tree, owners, j, axis, seed);
-            if whole.nats(evidence, &other) > whole.nats(evidence, tree) + BETTER {
-                *tree = other;
+            let before = *held.get_or_insert_with(|| whole.nats(evidence, tree));
+            let after = whole.nats(evidence, &other);
+            if after > before + BETTER {
+                (*tree, held) = (other, Some(after));
                 any = true;
             }
         }

@@ -5,6 +5,7 @@
 
 use super::discover::{motions_of, poses_of};
 use super::evidence::{Evidence, Motion, Sample};
+use super::labels::even_out;
 use super::settle::Owners;
 use super::whole::word;
 use hingecast_geom::KinematicTree;
@@ -14,8 +15,6 @@ use rayon::prelude::*;
 const ALIKE: f32 = 6.0;
 /// Samples of a part that tell.
 const ASKED: usize = 50;
-/// Rounds of smoothing over neighbours.
-const SMOOTHING: usize = 3;
 /// A point knows where it belongs if one part explains it better by this.
 const SURE: f32 = 0.3;
 
@@ -39,14 +38,7 @@ pub fn divide(
     let between = parts.map(|p| evidence.between(&poses_of(tree, p, evidence.n_states())));
     let lead = |s: &Sample| lead(evidence, s, [0, 1].map(|k: usize| &between[k][s.state][..]));
     let mut leads: Vec<f32> = points.par_iter().map(lead).collect();
-    for _ in 0..SMOOTHING {
-        let mean = |i: usize| {
-            let near = &neighbours[i];
-            let sum: f32 = near.iter().map(|&k| leads[k as usize]).sum();
-            0.4 * leads[i] + 0.6 * sum / near.len().max(1) as f32
-        };
-        leads = (0..leads.len()).into_par_iter().map(mean).collect();
-    }
+    even_out(&mut leads, neighbours);
     let mut reached: Vec<usize> = (0..leads.len()).filter(|&i| leads[i].abs() > SURE).collect();
     let mut known: Vec<bool> = leads.iter().map(|lead| lead.abs() > SURE).collect();
     let mut next = 0;

@@ -48,20 +48,20 @@ fn cheapest(n_parts: usize, cost: impl Fn(usize) -> f32) -> u8 {
 pub fn label(evidence: &Evidence, verdicts: &[Vec<Verdict>]) -> Vec<u8> {
     let n = verdicts[0].len();
     let mut costs: Vec<Vec<f32>> = verdicts.iter().map(|part| part.iter().map(cost).collect()).collect();
-    for _ in 0..SMOOTHING {
-        costs = costs
-            .iter()
-            .map(|c| {
-                let mean = |i: usize| {
-                    let near = &evidence.neighbours[i];
-                    let sum: f32 = near.iter().map(|&j| c[j as usize]).sum();
-                    0.4 * c[i] + 0.6 * sum / near.len().max(1) as f32
-                };
-                (0..n).into_par_iter().map(mean).collect()
-            })
-            .collect();
-    }
+    costs.iter_mut().for_each(|c| even_out(c, &evidence.neighbours));
     (0..n).map(|i| cheapest(costs.len(), |p| costs[p][i])).collect()
+}
+
+/// Every value becomes 0.4 of itself and 0.6 of its neighbours' mean, some times over.
+pub fn even_out(values: &mut Vec<f32>, neighbours: &[Vec<u32>]) {
+    for _ in 0..SMOOTHING {
+        let mean = |i: usize| {
+            let near = &neighbours[i];
+            let sum: f32 = near.iter().map(|&j| values[j as usize]).sum();
+            0.4 * values[i] + 0.6 * sum / near.len().max(1) as f32
+        };
+        *values = (0..values.len()).into_par_iter().map(mean).collect();
+    }
 }
 
 /// The part of every point of every state's cloud. [state][point]

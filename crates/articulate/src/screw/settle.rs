@@ -19,6 +19,7 @@ use hingecast_geom::{KinematicTree, Pose};
 use rayon::prelude::*;
 
 /// What belongs to which part.
+#[derive(Clone)]
 pub struct Owners {
     /// Part of every sample of the evidence.
     pub labels: Vec<u8>,
@@ -195,12 +196,16 @@ fn prune(evidence: &Evidence, tree: &mut KinematicTree, cost: Cost) -> Vec<Vec<V
             let without = left(&without);
             without - with - cost.of(without)
         };
-        let leaf = |p: &usize| !tree.joints.iter().any(|j| j.parent == *p);
-        let weakest = (1..tree.parts.len()).filter(leaf).map(|p| (gain(p), p)).min_by(|a, b| a.0.total_cmp(&b.0));
+        let weakest = leaves(tree).map(|p| (gain(p), p)).min_by(|a, b| a.0.total_cmp(&b.0));
         let Some((_, part)) = weakest.filter(|w| w.0 < 0.0) else { return verdicts };
         *tree = without(tree, part);
         verdicts.remove(part);
     }
+}
+
+/// Moving parts that carry no other.
+pub fn leaves(tree: &KinematicTree) -> impl Iterator<Item = usize> {
+    (1..tree.parts.len()).filter(|p| tree.joints.iter().all(|j| j.parent != *p))
 }
 
 /// The tree without a part that carries no other, the others counted anew.
