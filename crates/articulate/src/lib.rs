@@ -1,39 +1,50 @@
-//! Gaussians of several joint states -> parts, joints, a kinematic tree.
+//! Depth of an articulated object in several states -> its parts, its joints, a kinematic tree, and what is doubtful.
 //!
-//! The classical way (`--method track`), in the order of its files:
+//! [`find`](find()) does it all; the folders are its steps, in this order:
 //!
 //! ```text
-//! track         gaussians of the first state carried from state to state (Dynamic 3D Gaussians)
-//! physics       its rigidity, rotation and isometry losses
-//! segment       gaussians grouped by how their pairwise distances change (cluster: k-means, HDBSCAN)
-//! motion, icp   one rigid motion per part and state: robust Kabsch, then ICP against the depth
-//! joints        revolute or prismatic, axis through the points that the motion leaves in place (fixed_points)
+//! observe     what was seen: surfaces, empty space, corrected cameras. Immutable once built
+//! model       what is believed: trees, who owns which sample, motions, small edits
+//! score       how well a motion, a part, a whole tree explains what was seen. Pure functions
+//! fit         joints fitted to samples
+//! search      parts one after another: candidates, ranked by what they explain
+//! passes      the list of named passes from a discovery to the final estimate
+//! label       which part every piece of surface belongs to
+//! doubt       what a person should know before believing the joints
+//! pictures    noisy recordings: joints by pictures and depth together
+//! classical   the other method (`--method track`), for comparison
 //! ```
-//! World frame and scene units throughout; state 0 is the canonical configuration.
+//!
+//! World frame, scene units and radians throughout; `a_from_b` maps points of frame b into frame a; cameras are OpenCV's.
+//! Same input, settings and seed give the same bytes with any number of threads.
+//!
+//! # Examples
+//! See [`find`](find()): depth images of your own, ten lines to their joints. `examples/find_joints.rs` of the crate `hingecast` does the
+//! same from a recording.
 
-pub mod cluster;
-pub mod fixed_points;
-pub mod icp;
-pub mod joints;
-pub mod motion;
-pub mod physics;
-pub mod screw;
-pub mod segment;
-pub mod track;
+pub mod classical;
+mod config;
+mod depths;
+pub mod doubt;
+mod error;
+mod find;
+pub mod fit;
+pub mod label;
+pub mod model;
+pub mod observe;
+pub mod passes;
+pub mod pictures;
+pub mod score;
+pub mod search;
+mod weigh_doubts;
 
-/// Positions and rotations of `n` gaussians in every state.
-#[derive(Clone, Debug, Default, PartialEq)]
-pub struct Trajectories {
-    /// World positions. [state][n]
-    pub means: Vec<Vec<[f32; 3]>>,
-    /// Unit quaternions w x y z. [state][n]
-    pub quats: Vec<Vec<[f32; 4]>>,
-}
-
-#[derive(Debug, thiserror::Error)]
-pub enum ArticulateError {
-    #[error("{what}\n  where: {place}\n  try: {hint}")]
-    Input { what: String, place: String, hint: String },
-    #[error(transparent)]
-    Cancelled(#[from] hingecast_geom::Cancelled),
-}
+pub use config::{Config, MANY_STATES};
+pub use depths::Depths;
+pub use doubt::Doubt;
+pub use error::{ArticulateError, DepthError};
+pub use find::{Articulation, find};
+pub use label::labelled::Labelled;
+pub use observe::depth_view::{BACKGROUND, DepthView, OBJECT, UNKNOWN};
+pub use observe::evidence::MOST_STATES;
+pub use passes::driver::PassRecord;
+pub use pictures::information::Information;

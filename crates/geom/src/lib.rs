@@ -9,6 +9,7 @@
 pub mod camera;
 pub mod folder;
 pub mod gaussians;
+pub mod icp;
 pub mod input_error;
 pub mod mesh;
 pub mod mesh_io;

@@ -36,13 +36,22 @@ pub struct Config {
     /// Decoded images kept in memory, MB.
     pub memory_mb: usize,
     pub fit: Fit,
-    pub screw: articulate::screw::Config,
-    pub track: articulate::track::Config,
-    pub parts: articulate::segment::Config,
-    pub joints: articulate::joints::Config,
+    pub screw: articulate::Config,
+    pub passes: Passes,
+    pub track: articulate::classical::track::Config,
+    pub parts: articulate::classical::segment::Config,
+    pub joints: articulate::classical::joints::Config,
     pub twin: hingecast_twin::Config,
     /// A person's corrections.
     pub joint: Vec<JointOverride>,
+}
+
+/// Ablations of the search for parts.
+#[derive(Clone, Debug, Default, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct Passes {
+    /// Names of passes to leave out, as in `parts/trace.json`.
+    pub skip: Vec<String>,
 }
 
 #[derive(Clone, Debug, Serialize, Deserialize)]
@@ -69,6 +78,7 @@ impl Default for Config {
             memory_mb: 1000,
             fit: Fit::default(),
             screw: Default::default(),
+            passes: Default::default(),
             track: Default::default(),
             parts: Default::default(),
             joints: Default::default(),
@@ -235,7 +245,7 @@ mod tests {
         let c = Config::resolve(Preset::Fast, Some(&file), &["fit.steps=9".into(), "parts.cluster=hdbscan".into()])
             .unwrap();
         assert_eq!((c.seed, c.fit.steps, c.fit.gaussians), (3, 9, 12_000));
-        assert_eq!(c.parts.cluster, articulate::segment::Clusterer::Hdbscan);
+        assert_eq!(c.parts.cluster, articulate::classical::segment::Clusterer::Hdbscan);
     }
 
     #[test]

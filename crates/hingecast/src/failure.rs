@@ -38,6 +38,8 @@ impl std::fmt::Display for Failure {
     }
 }
 
+impl std::error::Error for Failure {}
+
 impl From<Cancelled> for Failure {
     fn from(_: Cancelled) -> Self {
         let hint = "run the same command again: finished stages and checkpoints are kept";
@@ -57,6 +59,11 @@ impl From<hingecast_articulate::ArticulateError> for Failure {
         match e {
             A::Input { what, place, hint } => Self::new(what, place, hint),
             A::Cancelled(c) => c.into(),
+            // What our own readers fail with comes back as it went.
+            A::Depths(e) => match e.downcast::<Self>() {
+                Ok(own) => *own,
+                Err(e) => Self::new(e.to_string(), "the recording", "run `hingecast check` on the recording"),
+            },
         }
     }
 }

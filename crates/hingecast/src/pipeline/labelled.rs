@@ -3,8 +3,7 @@
 use super::{Context, placed, screw, surface};
 use crate::failure::{Failure, Result};
 use glam::Vec3;
-use hingecast_articulate::screw::Labelled;
-use hingecast_articulate::screw::labels::far_off_plane;
+use hingecast_articulate::label::labelled::{Labelled, far_off_plane};
 use hingecast_geom::ply::{read_vertices, write_float_vertices};
 use hingecast_geom::{KinematicTree, PointTree, Pose};
 use hingecast_twin::{BACKGROUND, UNKNOWN};
@@ -97,12 +96,12 @@ impl LabelledSurface {
     }
 }
 
-/// The labelled samples of every state; `rig`: how far each state's world has been moved since, if it has.
-pub fn surfaces(run: &Path, n_states: usize, rig: &[Pose]) -> Result<Vec<LabelledSurface>> {
+/// The labelled samples of every state; `state_from_world`: how far each state's world has been moved since, if it has.
+pub fn surfaces(run: &Path, n_states: usize, state_from_world: &[Pose]) -> Result<Vec<LabelledSurface>> {
     let labelled = load(run)?;
     let of_state = |state: usize| {
         let own: Vec<&Labelled> = labelled.iter().filter(|s| s.state == state).collect();
-        let back = rig.get(state).map_or(Pose::IDENTITY, Pose::inverse);
+        let back = state_from_world.get(state).map_or(Pose::IDENTITY, Pose::inverse);
         let points: Vec<Vec3> = own.iter().map(|s| back.apply(s.point.as_dvec3()).as_vec3()).collect();
         LabelledSurface::new(points, own.iter().map(|s| s.part).collect())
     };
@@ -111,7 +110,7 @@ pub fn surfaces(run: &Path, n_states: usize, rig: &[Pose]) -> Result<Vec<Labelle
 
 /// Part of every pixel of `frames`: that of the labelled sample of its state which lies nearest in its plane.
 pub fn pixel_labels(context: &Context, run: &Path, frames: &[usize]) -> Result<Vec<Vec<u8>>> {
-    let by_state = surfaces(run, context.recording.n_states, &placed::load(run)?.rig)?;
+    let by_state = surfaces(run, context.recording.n_states, &placed::load(run)?.state_from_world)?;
     let reach = (2.0 * screw::load(run)?.voxel).powi(2);
     let of_frame = |&f: &usize| -> Result<Vec<u8>> {
         let view = context.view(f)?;

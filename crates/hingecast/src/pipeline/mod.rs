@@ -15,7 +15,7 @@ use crate::config::{Config, Method};
 use crate::failure::{Failure, Result};
 use crate::stage::{RunFolder, erased, stamp};
 use crate::ui::Ui;
-use hingecast_articulate::screw::evidence::MOST_STATES;
+use hingecast_articulate::MOST_STATES;
 use hingecast_capture::{Recording, Split, View, ViewCache};
 use hingecast_geom::Pose;
 use std::collections::BTreeMap;
@@ -158,7 +158,7 @@ fn stamps(c: &Config, fingerprint: &str) -> Vec<String> {
     };
     match c.method {
         Method::Screw => {
-            let first = stamp(&[&fingerprint, &c.seed, &c.method, &c.screw]);
+            let first = stamp(&[&fingerprint, &c.seed, &c.method, &c.screw, &c.passes]);
             chain(first, &[&c.fit, &c.joint, &c.twin])
         }
         Method::Track => {

@@ -3,7 +3,8 @@
 
 use super::{Context, splat};
 use crate::failure::{Failure, Result};
-use hingecast_articulate::{Trajectories, track};
+use hingecast_articulate::classical::track;
+use hingecast_articulate::classical::trajectories::Trajectories;
 use hingecast_geom::ply::{read_vertices, write_float_vertices};
 use std::path::{Path, PathBuf};
 

@@ -5,7 +5,8 @@ use super::splat::{self, Extent};
 use super::{Context, labelled, screw};
 use crate::failure::Result;
 use crate::stage::{read_json, write_json};
-use hingecast_articulate::screw::photometric::{self, Shot};
+use hingecast_articulate::pictures::levenberg::refine_by_pictures;
+use hingecast_articulate::pictures::problem::Shot;
 use hingecast_capture::{Recording, Split};
 use hingecast_geom::{KinematicTree, Pose};
 use hingecast_splat::{Engine, SurfaceSample, Target, Views, from_surface, surface_samples};
@@ -24,7 +25,7 @@ pub struct Placed {
     pub tree: KinematicTree,
     /// Per state: what its cameras, as the stage before left them, take for the world, from the world. Empty where depth had the
     /// last word.
-    pub rig: Vec<Pose>,
+    pub state_from_world: Vec<Pose>,
     /// What the tree cost before the pictures were asked, and after.
     pub nats: [f64; 2],
 }
@@ -33,8 +34,8 @@ impl Placed {
     /// Corrects cameras (camera_from_world by frame) by what their states' worlds were off.
     pub fn correct(&self, recording: &Recording, cameras: &mut BTreeMap<usize, Pose>) {
         for (frame, camera) in cameras {
-            if let Some(rig) = self.rig.get(recording.frames[*frame].state) {
-                *camera = *camera * *rig;
+            if let Some(state) = self.state_from_world.get(recording.frames[*frame].state) {
+                *camera = *camera * *state;
             }
         }
     }
@@ -68,16 +69,21 @@ pub fn run(context: &Context, run: &Path, at: &Path) -> Result<()> {
     let pose = |i: usize| poses[state_of(i)].clone();
     let views = Views { count: targets.len(), get: &get, poses: Some(&pose) };
     let mut gaussians = splat::fit(context, engine, &views, at, &progress)?;
-    let mut placed =
-        Placed { parts: groups.iter().map(|g| *g as u8).collect(), tree: found.tree, rig: Vec::new(), nats: [0.0; 2] };
+    let mut placed = Placed {
+        parts: groups.iter().map(|g| *g as u8).collect(),
+        tree: found.tree,
+        state_from_world: Vec::new(),
+        nats: [0.0; 2],
+    };
     if !found.information.is_empty() {
         let shot = |(v, target): (usize, &Arc<Target>)| Shot { target: target.clone(), state: state_of(v) };
         let shots: Vec<Shot> = targets.iter().enumerate().map(shot).collect();
         let mut engine = Engine::from_gaussians(&gaussians, context.threads)?;
         engine.set_groups(&groups, &poses[0])?;
-        let refined = photometric::refine(&mut engine, &shots, &placed.tree, &found.information, &progress)?;
+        let refined = refine_by_pictures(&mut engine, &shots, &placed.tree, &found.information, &progress)?;
         groups.iter().enumerate().for_each(|(i, g)| gaussians.transform_one(i, &refined.first[usize::from(*g)]));
-        placed = Placed { tree: refined.tree, rig: refined.rig, nats: refined.cost, ..placed };
+        placed =
+            Placed { tree: refined.tree, state_from_world: refined.state_from_world, nats: refined.cost, ..placed };
     }
     gaussians.write_ply(&at.join("gaussians.ply"))?;
     write_json(&at.join("placed.json"), &placed)?;

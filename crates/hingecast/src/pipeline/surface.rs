@@ -3,8 +3,8 @@
 use super::Context;
 use crate::failure::Result;
 use glam::{DVec2, DVec3, Vec3};
-use hingecast_articulate::icp::Surface;
 use hingecast_capture::{Split, View};
+use hingecast_geom::icp::Surface;
 use rayon::prelude::*;
 
 /// Calls `emit(point, pixel index)` for every `stride`-th usable depth pixel of the object.

@@ -1,0 +1,203 @@
+//! Parts and joints from all states' depth at once. `docs/method.md` has the equations.
+
+use crate::config::Config;
+use crate::depths::{Depths, check_views};
+use crate::doubt::Doubt;
+use crate::error::ArticulateError;
+use crate::label::boundaries::sharpen;
+use crate::label::by_evidence::label_clouds;
+use crate::label::labelled::Labelled;
+use crate::model::estimate::{Discovery, FitReport};
+use crate::observe::depth_view::DepthView;
+use crate::observe::evidence::{Evidence, MOST_STATES};
+use crate::observe::lattice::Lattice;
+use crate::observe::{align_to_base, cameras};
+use crate::passes::driver::{PassRecord, settle};
+use crate::passes::optional_names;
+use crate::pictures::information::{Information, of_parts};
+use crate::search::discover::discover;
+use crate::weigh_doubts::weigh_doubts;
+use hingecast_geom::{Certainty, KinematicTree, Pose, Progress};
+
+/// Everything that the depth says about parts and joints.
+pub struct Articulation {
+    /// Parts and joints, with a value of every joint in every state. State 0 is the canonical configuration.
+    pub tree: KinematicTree,
+    /// The surface of every state, one sample a voxel and facing, finer where parts meet.
+    pub samples: Vec<Labelled>,
+    /// Edge of a voxel, scene units.
+    pub voxel: f32,
+    /// Per state and view: camera_from_world as corrected.
+    pub cameras: Vec<Vec<Pose>>,
+    /// What the last fit knew.
+    pub report: FitReport,
+    /// What the depth says about the pose of every part (see [`crate::pictures`]); empty where depth is so sharp that pictures
+    /// have nothing to add. [state][part]
+    pub information: Vec<Vec<Information>>,
+    /// Of each joint, in the tree's order.
+    pub certainty: Vec<Certainty>,
+    /// Gravest first.
+    pub doubts: Vec<Doubt>,
+    /// What every pass did, in order.
+    pub trace: Vec<PassRecord>,
+}
+
+/// Finds parts and joints.
+///
+/// # Errors
+/// No state or more than [`MOST_STATES`], an extent or a view that is empty or not finite, a pass to skip that does not exist; what
+/// `depths` fails with; the wish to stop.
+///
+/// # Examples
+/// ```
+/// use glam::{DVec2, DVec3};
+/// use hingecast_articulate::{Config, DepthView, find};
+/// use hingecast_geom::{Camera, Progress};
+///
+/// // Depth of a lid, [-1, 1] x [-0.6, 0.6] x [0, 0.1], that slides along x over a table at z = 0; in every state 12 views.
+/// let z_at = |eye: DVec3, ray: DVec3, x: f64| {
+///     let (lo, hi) = (DVec3::new(x - 1.0, -0.6, 0.0), DVec3::new(x + 1.0, 0.6, 0.1));
+///     let (a, b) = ((lo - eye) / ray, (hi - eye) / ray);
+///     let (enter, leave) = (a.min(b).max_element(), a.max(b).min_element());
+///     let table = -eye.z / ray.z;
+///     let on_table = eye + ray * table;
+///     let hits_table = table > 0.0 && on_table.x.abs() < 2.0 && on_table.y.abs() < 1.0;
+///     if enter < leave { Some(enter) } else { hits_table.then_some(table) }
+/// };
+/// let view = |k: usize, x: f64| {
+///     let turn = k as f64 * 0.52;
+///     let eye = DVec3::new(4.0 * turn.cos(), 4.0 * turn.sin(), 3.0);
+///     let camera = Camera::look_at(eye, DVec3::ZERO, DVec3::Z, 80, 60, 0.9);
+///     let depth = |i: usize| {
+///         let ray = camera.ray(DVec2::new((i % 80) as f64 + 0.5, (i / 80) as f64 + 0.5));
+///         z_at(eye, ray, x).map_or(0.0, |t| camera.project(eye + ray * t).1 as f32)
+///     };
+///     DepthView::new(camera, (0..80 * 60).map(depth).collect())
+/// };
+/// let mut states: Vec<Vec<_>> = [-0.8, -0.5, 0.1, 0.6, 0.8].map(|x| (0..12).map(|k| view(k, x)).collect()).to_vec();
+///
+/// let found = find(&mut states, &Config { cells: 48, ..Config::default() }, &Progress::default())?;
+/// let lid = &found.tree.joints[0];
+/// assert!(!lid.screw.kind.turns() && lid.screw.axis.x.abs() > 0.999);
+/// assert!((lid.values[4].abs() - 1.6).abs() < 0.02, "{:?}", lid.values);
+/// # Ok::<(), hingecast_articulate::ArticulateError>(())
+/// ```
+pub fn find(depths: &mut dyn Depths, config: &Config, progress: &Progress) -> Result<Articulation, ArticulateError> {
+    let (n_states, seed) = (depths.n_states(), config.seed);
+    let lattice = checked_lattice(depths, config)?;
+    let mut cameras: Vec<Vec<Pose>> = Vec::new();
+    let mut evidence = Evidence::gather::<ArticulateError>(
+        n_states,
+        lattice,
+        &mut |state| {
+            progress.report(state, n_states, "surface and space")?;
+            let mut views = depths.views(state).map_err(ArticulateError::Depths)?;
+            check_views(&views, state)?;
+            if config.align_cameras {
+                cameras::align(&mut views, lattice.voxel);
+            }
+            cameras.push(views.iter().map(|v| v.camera.camera_from_world).collect());
+            Ok(views)
+        },
+        seed,
+    )?;
+    let discovery = discover(&evidence, config.max_parts, seed, progress)?;
+    let cost = discovery.cost;
+    progress.report(0, 1, "refining")?;
+    let (mut estimate, mut trace);
+    (evidence, estimate, trace) = settle(evidence, discovery, seed, &config.skip);
+    correct(&estimate.world_from_state, &mut cameras);
+    let mut labels = label_clouds(&evidence, &estimate.tree, &estimate.owners);
+    let noisy = evidence.is_noisy();
+    if config.align_cameras && noisy {
+        let base = align_to_base::base(&evidence, &labels);
+        let before = evidence;
+        evidence = Evidence::gather::<ArticulateError>(
+            n_states,
+            lattice,
+            &mut |state| {
+                progress.report(state, n_states, "views of what stands still")?;
+                let mut views = corrected(depths, state, &cameras[state])?;
+                align_to_base::align(&mut views, &before, state, &labels[state], &base);
+                cameras[state] = views.iter().map(|v| v.camera.camera_from_world).collect();
+                Ok(views)
+            },
+            seed,
+        )?;
+        drop(before);
+        let again = Discovery::again(&evidence, estimate.tree, cost);
+        let second;
+        (evidence, estimate, second) = settle(evidence, again, seed, &config.skip);
+        trace.extend(second);
+        correct(&estimate.world_from_state, &mut cameras);
+        labels = label_clouds(&evidence, &estimate.tree, &estimate.owners);
+    }
+    let information = if noisy { of_parts(&evidence, &labels, &estimate) } else { Vec::new() };
+    let (doubts, certainty) = weigh_doubts(&evidence, &estimate, &labels, seed);
+    let samples = if noisy || !config.borders {
+        let of_state = |(state, own): (usize, &Vec<u8>)| -> Vec<Labelled> {
+            let points = &evidence.clouds[state].points;
+            points.iter().zip(own).map(|(point, part)| Labelled { state, point: *point, part: *part }).collect()
+        };
+        labels.iter().enumerate().flat_map(of_state).collect()
+    } else {
+        sharpen::<ArticulateError>(&evidence, &estimate.tree, &labels, &mut |state| {
+            progress.report(state, n_states, "borders")?;
+            corrected(depths, state, &cameras[state])
+        })?
+    };
+    Ok(Articulation {
+        samples,
+        voxel: lattice.voxel,
+        tree: estimate.tree,
+        cameras,
+        report: estimate.report,
+        information,
+        certainty,
+        doubts,
+        trace,
+    })
+}
+
+/// Corrects the cameras of every state by what its frame was off.
+fn correct(world_from_state: &[Pose], cameras: &mut [Vec<Pose>]) {
+    for (views, world) in cameras.iter_mut().zip(world_from_state) {
+        views.iter_mut().for_each(|c| *c = *c * world.inverse());
+    }
+}
+
+/// The views of a state from where their cameras are.
+fn corrected(depths: &mut dyn Depths, state: usize, cameras: &[Pose]) -> Result<Vec<DepthView>, ArticulateError> {
+    let mut views = depths.views(state).map_err(ArticulateError::Depths)?;
+    views.iter_mut().zip(cameras).for_each(|(view, pose)| view.camera.camera_from_world = *pose);
+    Ok(views)
+}
+
+/// Cells of the grid along the object's longest side.
+const CELLS: std::ops::RangeInclusive<usize> = 8..=1000;
+
+/// The grid, once everything that it is made of has been looked at.
+fn checked_lattice(depths: &mut dyn Depths, config: &Config) -> Result<Lattice, ArticulateError> {
+    let n = depths.n_states();
+    if !(1..=MOST_STATES).contains(&n) {
+        let hint = "leave out states between the others";
+        let what = format!("{n} states, and between 1 and {MOST_STATES} can be compared");
+        return Err(ArticulateError::input(what, "the number of states", hint));
+    }
+    if !CELLS.contains(&config.cells) {
+        let hint = format!("cells = {} to {}", CELLS.start(), CELLS.end());
+        return Err(ArticulateError::input("a setting is out of range", format!("cells = {}", config.cells), hint));
+    }
+    if let Some(name) = config.skip.iter().find(|name| optional_names().all(|known| known != **name)) {
+        let names: Vec<&str> = optional_names().collect();
+        let what = format!("no pass '{name}' that could be left out");
+        return Err(ArticulateError::input(what, "passes.skip", format!("one of {}", names.join(", "))));
+    }
+    let (lo, hi) = depths.extent().map_err(ArticulateError::Depths)?;
+    let size = hi - lo;
+    if !(lo.is_finite() && hi.is_finite() && size.min_element() >= 0.0 && size.max_element() > 0.0) {
+        let hint = "is the depth in scene units, and does any pixel show the object?";
+        return Err(ArticulateError::input("the object has no extent", format!("from {lo} to {hi}"), hint));
+    }
+    Ok(Lattice::new(lo, hi, config.cells))
+}

@@ -1,0 +1,145 @@
+//! What was seen: all states' surfaces and spaces. Immutable once built.
+
+use super::cloud::gather;
+use super::depth_view::DepthView;
+use super::lattice::Lattice;
+use super::occupancy::Occupancy;
+use super::robust::deviation;
+use super::sample::{Motion, Sample};
+use glam::Vec3;
+use hingecast_geom::icp::Surface;
+use hingecast_geom::{PointTree, Pose};
+use rayon::prelude::*;
+
+/// Most states that witness at once: one bit each.
+pub const MOST_STATES: usize = 64;
+/// Samples that labels are decided on: in all, and at most per state.
+const SAMPLES: usize = 62_500;
+const PER_STATE: usize = 8000;
+/// Neighbours that must mostly agree before a contradiction counts.
+const NEIGHBOURS: usize = 8;
+
+/// Surfaces face the same way where the cosine between their normals is at least this: 32 deg.
+const FACES_ALIKE: f32 = 0.85;
+/// The nearest sample of a surface at a place is at most this many voxels away: samples are a voxel apart.
+const SAME_VOXEL: f32 = 1.1;
+/// Noise below this share of a voxel: the states' frames agree already.
+const SHARP: f32 = 0.05;
+
+pub struct Evidence {
+    pub lattice: Lattice,
+    /// Every sample of each state's surface.
+    pub clouds: Vec<Surface>,
+    pub spaces: Vec<Occupancy>,
+    /// A subset of all clouds, state after state.
+    pub samples: Vec<Sample>,
+    /// Nearest samples of the same state. [sample][NEIGHBOURS]
+    pub neighbours: Vec<Vec<u32>>,
+    /// Distance to the plane within which two measurements are the same surface, scene units.
+    pub tolerance: f32,
+}
+
+impl Evidence {
+    /// `states(s)` answers the views of state s; they are dropped before the next state is asked for.
+    pub fn gather<E>(
+        n_states: usize,
+        lattice: Lattice,
+        states: &mut dyn FnMut(usize) -> Result<Vec<DepthView>, E>,
+        seed: u64,
+    ) -> Result<Self, E> {
+        let (mut clouds, mut spaces, mut samples) = (Vec::new(), Vec::new(), Vec::new());
+        let mut neighbours = Vec::new();
+        let mut rng = fastrand::Rng::with_seed(seed ^ 0x5a3b);
+        for state in 0..n_states {
+            let views = states(state)?;
+            let least = if views.len() >= 8 { 2 } else { 1 };
+            let cloud = gather(&views, lattice.voxel, 1, least);
+            spaces.push(Occupancy::new(lattice, &cloud, &views, 1.5));
+            let mut order: Vec<usize> = (0..cloud.points.len()).collect();
+            rng.shuffle(&mut order);
+            order.truncate((SAMPLES / n_states).min(PER_STATE));
+            order.sort_unstable();
+            let first = samples.len() as u32;
+            let points: Vec<Vec3> = order.iter().map(|&i| cloud.points[i]).collect();
+            let tree = PointTree::new(&points);
+            neighbours.par_extend(points.par_iter().map(|x| {
+                let near = tree.k_nearest(*x, NEIGHBOURS + 1);
+                near.into_iter().skip(1).map(|j| first + j).collect::<Vec<u32>>()
+            }));
+            let cloud = Surface::new(cloud.points, cloud.normals);
+            samples.extend(order.iter().map(|&i| Sample::of(&cloud, state, i)));
+            clouds.push(cloud);
+        }
+        let mut evidence = Self { lattice, clouds, spaces, samples, neighbours, tolerance: 0.2 * lattice.voxel };
+        evidence.tolerance = evidence.tolerance.max(4.0 * evidence.noise());
+        Ok(evidence)
+    }
+
+    /// Longest side of the space that the object takes in all states, scene units.
+    pub fn extent(&self) -> f32 {
+        (self.lattice.size.as_vec3() * self.lattice.voxel).max_element()
+    }
+
+    pub fn n_states(&self) -> usize {
+        self.spaces.len()
+    }
+
+    /// Whether depth or poses are so noisy that the states' frames have to be brought together.
+    pub fn is_noisy(&self) -> bool {
+        self.tolerance > 4.0 * SHARP * self.lattice.voxel
+    }
+
+    /// Median distance between a sample and the plane that another state measured where the sample stands still.
+    fn noise(&self) -> f32 {
+        let mut off: Vec<f32> = (0..self.samples.len())
+            .into_par_iter()
+            .step_by(7)
+            .filter_map(|i| {
+                let s = &self.samples[i];
+                let t = (s.state + 1 + i % (self.n_states() - 1).max(1)) % self.n_states();
+                if t == s.state {
+                    return None;
+                }
+                Some(self.height(t, s.point, s.normal)?.abs())
+            })
+            .collect();
+        deviation(&mut off)
+    }
+
+    /// State t's sample nearest to `x`, if it lies within `reach` and faces as `n` does.
+    pub fn surface_at(&self, t: usize, x: Vec3, n: Vec3, reach: f32) -> Option<usize> {
+        let cloud = &self.clouds[t];
+        let (i, squared) = cloud.nearest(x)?;
+        (squared <= reach * reach && cloud.normals[i].dot(n) >= FACES_ALIKE).then_some(i)
+    }
+
+    /// Height of `x` above the plane of state t's sample nearest to it, if that lies within a voxel and faces the same way.
+    pub fn height(&self, t: usize, x: Vec3, n: Vec3) -> Option<f32> {
+        let (cloud, i) = (&self.clouds[t], self.surface_at(t, x, n, SAME_VOXEL * self.lattice.voxel)?);
+        Some(cloud.normals[i].dot(x - cloud.points[i]))
+    }
+
+    /// Whether state t measured a surface at `x` that faces along `n`, within the noise.
+    pub fn meets(&self, t: usize, x: Vec3, n: Vec3) -> bool {
+        self.height(t, x, n).is_some_and(|d| d.abs() < self.tolerance)
+    }
+
+    /// How near `x` is to surface of state t that faces along `n`: 1 on it, half at the tolerance, 0 where there is none.
+    pub fn nearness(&self, t: usize, x: Vec3, n: Vec3) -> f32 {
+        self.height(t, x, n).map_or(0.0, |d| 1.0 / (1.0 + (d / self.tolerance).powi(2)))
+    }
+
+    /// The same with what each state measured moved by its correction (its samples; the grid is too coarse to care).
+    pub fn in_frames(mut self, corrections: &[Pose]) -> Self {
+        let motions: Vec<Motion> = corrections.iter().map(|c| Motion::from(*c)).collect();
+        for s in &mut self.samples {
+            *s = s.moved(&motions[s.state]);
+        }
+        for (cloud, m) in self.clouds.iter_mut().zip(&motions) {
+            let points = cloud.points.iter().map(|x| m.apply(*x)).collect();
+            let normals = cloud.normals.iter().map(|n| m.rot * *n).collect();
+            *cloud = Surface::new(points, normals);
+        }
+        self
+    }
+}

@@ -1,0 +1,63 @@
+//! The grid that all states share.
+
+use glam::{IVec3, Vec3};
+
+/// Grid that all states share.
+#[derive(Clone, Copy, Debug)]
+pub struct Lattice {
+    pub lo: Vec3,
+    pub voxel: f32,
+    pub size: IVec3,
+    /// 1 / voxel.
+    per_voxel: f32,
+}
+
+impl Lattice {
+    /// Covers `lo..hi` with a margin of 3 voxels; `cells` along the longest side.
+    pub fn new(lo: Vec3, hi: Vec3, cells: usize) -> Self {
+        let voxel = (hi - lo).max_element() / cells as f32;
+        let size = ((hi - lo) / voxel).ceil().as_ivec3() + IVec3::splat(7);
+        Self { lo: lo - Vec3::splat(3.0 * voxel), voxel, size, per_voxel: 1.0 / voxel }
+    }
+
+    pub fn len(&self) -> usize {
+        (self.size.x * self.size.y * self.size.z) as usize
+    }
+
+    pub fn is_empty(&self) -> bool {
+        self.len() == 0
+    }
+
+    pub(super) fn cell(&self, x: Vec3) -> IVec3 {
+        ((x - self.lo) * self.per_voxel).floor().as_ivec3()
+    }
+
+    pub(super) fn index_of(&self, c: IVec3) -> Option<usize> {
+        let inside = c.cmpge(IVec3::ZERO).all() && c.cmplt(self.size).all();
+        inside.then(|| ((c.z * self.size.y + c.y) * self.size.x + c.x) as usize)
+    }
+
+    /// Index of the cell that holds `x`. Asked hundreds of millions of times, so it rounds by cutting off decimals: what is inside
+    /// is not negative.
+    #[inline]
+    pub fn index(&self, x: Vec3) -> Option<usize> {
+        let t = (x - self.lo) * self.per_voxel;
+        let inside = t.cmpge(Vec3::ZERO).all() && t.cmplt(self.size.as_vec3()).all();
+        let c = t.as_ivec3();
+        inside.then(|| ((c.z * self.size.y + c.y) * self.size.x + c.x) as usize)
+    }
+
+    /// Calls `visit` with the index of the cell that holds `x` and of the 26 around it.
+    pub fn around(&self, x: Vec3, visit: &mut dyn FnMut(usize)) {
+        let c = self.cell(x);
+        for k in 0..27 {
+            if let Some(i) = self.index_of(c + IVec3::new(k % 3 - 1, k / 3 % 3 - 1, k / 9 - 1)) {
+                visit(i);
+            }
+        }
+    }
+
+    pub(super) fn centre(&self, c: IVec3) -> Vec3 {
+        self.lo + (c.as_vec3() + 0.5) * self.voxel
+    }
+}
