@@ -22,6 +22,8 @@
 //! See [`find`](find()): depth images of your own, ten lines to their joints. `examples/find_joints.rs` of the crate `hingecast` does the
 //! same from a recording.
 
+#![warn(missing_docs)]
+
 pub mod classical;
 mod config;
 mod depths;

@@ -7,6 +7,7 @@ use hingecast_geom::pose::rotation_vector;
 use hingecast_geom::{Joint, JointKind, KinematicTree, Pose, Screw};
 use serde::{Deserialize, Serialize};
 
+/// Settings of the axis fit.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct Config {

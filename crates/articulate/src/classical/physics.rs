@@ -14,11 +14,15 @@ use rayon::prelude::*;
 /// Neighbours per gaussian, as published.
 pub const K: usize = 20;
 
+/// Weights of the three losses.
 #[derive(Clone, Copy, Debug, serde::Serialize, serde::Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct PhysicsWeights {
+    /// Neighbours keep their places in the frame that turns with a gaussian.
     pub rigid: f32,
+    /// Neighbours turn alike.
     pub rotation: f32,
+    /// Neighbours keep their distances of the first state.
     pub isometry: f32,
 }
 

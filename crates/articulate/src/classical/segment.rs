@@ -13,16 +13,21 @@ use hingecast_geom::{Pose, Progress};
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
+/// How gaussians are grouped.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Clusterer {
+    /// k-means++, the number of groups by silhouette.
     Kmeans,
+    /// Density clusters.
     Hdbscan,
 }
 
+/// Settings of the grouping.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct Config {
+    /// How gaussians are grouped.
     pub cluster: Clusterer,
     /// Number of parts; 0 = chosen by the silhouette.
     pub parts: usize,

@@ -11,6 +11,7 @@ use hingecast_geom::{Cancelled, Gaussians, Progress};
 use hingecast_splat::{Engine, Gradients, LossConfig, Rates, SplatError, Target, plane};
 use serde::{Deserialize, Serialize};
 
+/// Settings of the tracking.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct Config {
@@ -20,6 +21,7 @@ pub struct Config {
     pub rate: [f32; 2],
     /// Step size of the quaternions at the start; falls as that of the means does.
     pub quat_rate: f32,
+    /// Weights of the losses that keep things rigid.
     pub physics: PhysicsWeights,
     /// Weight of the depth loss.
     pub depth: f32,

@@ -20,6 +20,7 @@ use rayon::prelude::*;
 pub struct Settings {
     /// Largest accepted distance in the first and the last round, scene units.
     pub gates: [f64; 2],
+    /// Rounds in all.
     pub rounds: usize,
     /// Other states that each sample is compared with per round.
     pub partners: usize,

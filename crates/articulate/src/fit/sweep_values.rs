@@ -46,9 +46,11 @@ impl Worth {
 /// What a sweep asks.
 #[derive(Clone, Copy)]
 pub struct Question<'a> {
+    /// What was seen.
     pub evidence: &'a Evidence,
     /// Of the parts that are known.
     pub claims: &'a Claims,
+    /// What claimed surface counts.
     pub worth: Worth,
 }
 

@@ -9,8 +9,11 @@ use nalgebra::DVector;
 /// Where a joint's parameters stand in the unknowns: axis 2, pivot 2 (hinges), values from state 1 on.
 #[derive(Clone, Copy)]
 pub struct Slot {
+    /// First unknown of the shape: two tilts, and for hinges two shifts.
     pub shape: usize,
+    /// Unknowns of the shape: 4 of a hinge, 2 of a slide.
     pub n_shape: usize,
+    /// Unknown of the value in state 1; those of later states follow.
     pub values: usize,
 }
 

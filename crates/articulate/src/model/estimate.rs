@@ -9,6 +9,7 @@ use hingecast_geom::{KinematicTree, Pose};
 
 /// What the search found, before labels are settled.
 pub struct Discovery {
+    /// Parts and joints.
     pub tree: KinematicTree,
     /// Under every part, on every sample. [part][sample]
     pub verdicts: Vec<Vec<Verdict>>,
@@ -27,7 +28,9 @@ impl Discovery {
 /// The tree and what was found with it.
 #[derive(Clone, Debug)]
 pub struct Estimate {
+    /// Parts and joints.
     pub tree: KinematicTree,
+    /// Who owns which sample.
     pub owners: Owners,
     /// Under every part, on every sample. [part][sample]
     pub verdicts: Vec<Vec<Verdict>>,
@@ -39,6 +42,7 @@ pub struct Estimate {
     pub world_from_state: Vec<Pose>,
     /// Corrections of the states' frames that the evidence has yet to be moved by.
     pub reframe: Option<Vec<Pose>>,
+    /// Of the last fit.
     pub report: FitReport,
     /// Share of the samples that every part contradicts.
     pub unexplained: f64,

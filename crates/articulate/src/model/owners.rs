@@ -6,7 +6,9 @@ use crate::observe::sample::Sample;
 /// A sample and the part that it belongs to.
 #[derive(Clone, Copy, Debug)]
 pub struct Member {
+    /// Where, and in which state.
     pub sample: Sample,
+    /// Index of its part.
     pub part: usize,
     /// States that it is compared with, one bit each.
     pub shown: u64,

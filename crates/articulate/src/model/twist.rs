@@ -40,6 +40,7 @@ impl Twist {
         Vector6::new(v.x, v.y, v.z, w.x, w.y, w.z)
     }
 
+    /// Velocity of the point `x`.
     pub fn at(&self, x: DVec3) -> DVec3 {
         self.v + self.w.cross(x)
     }

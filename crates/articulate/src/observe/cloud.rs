@@ -10,6 +10,7 @@ use std::collections::HashMap;
 /// Oriented samples of a surface, world frame.
 #[derive(Clone, Debug, Default)]
 pub struct Cloud {
+    /// Scene units.
     pub points: Vec<Vec3>,
     /// Unit, towards the cameras that saw them.
     pub normals: Vec<Vec3>,

@@ -10,6 +10,7 @@ use hingecast_geom::Camera;
 
 /// Pixel classes of a [`DepthView`].
 pub const BACKGROUND: u8 = 0;
+/// The object, at a known depth.
 pub const OBJECT: u8 = 1;
 /// Says nothing: a hand, a hole in the depth.
 pub const UNKNOWN: u8 = 2;
@@ -17,9 +18,11 @@ pub const UNKNOWN: u8 = 2;
 /// What one camera measured. (h, w)
 #[derive(Clone, Debug)]
 pub struct DepthView {
+    /// OpenCV camera; its pose is `camera_from_world`.
     pub camera: Camera,
     /// z, scene units; only read where `class` is [`OBJECT`].
     pub depth: Vec<f32>,
+    /// [`OBJECT`], [`BACKGROUND`] or [`UNKNOWN`] of every pixel.
     pub class: Vec<u8>,
 }
 

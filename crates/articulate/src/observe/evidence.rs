@@ -26,10 +26,13 @@ const SAME_VOXEL: f32 = 1.1;
 /// Noise below this share of a voxel: the states' frames agree already.
 const SHARP: f32 = 0.05;
 
+/// What was seen, of all states.
 pub struct Evidence {
+    /// The grid that all states share.
     pub lattice: Lattice,
     /// Every sample of each state's surface.
     pub clouds: Vec<Surface>,
+    /// Surface, empty space and the unseen of each state.
     pub spaces: Vec<Occupancy>,
     /// A subset of all clouds, state after state.
     pub samples: Vec<Sample>,
@@ -80,6 +83,7 @@ impl Evidence {
         (self.lattice.size.as_vec3() * self.lattice.voxel).max_element()
     }
 
+    /// Number of states.
     pub fn n_states(&self) -> usize {
         self.spaces.len()
     }

@@ -3,10 +3,14 @@
 use glam::{IVec3, Vec3};
 
 /// Grid that all states share.
+/// Cubic cells of one size.
 #[derive(Clone, Copy, Debug)]
 pub struct Lattice {
+    /// Lowest corner, world frame.
     pub lo: Vec3,
+    /// Edge of a cell, scene units.
     pub voxel: f32,
+    /// Cells along x, y, z.
     pub size: IVec3,
     /// 1 / voxel.
     per_voxel: f32,
@@ -20,10 +24,12 @@ impl Lattice {
         Self { lo: lo - Vec3::splat(3.0 * voxel), voxel, size, per_voxel: 1.0 / voxel }
     }
 
+    /// Number of cells.
     pub fn len(&self) -> usize {
         (self.size.x * self.size.y * self.size.z) as usize
     }
 
+    /// Whether there is no cell.
     pub fn is_empty(&self) -> bool {
         self.len() == 0
     }

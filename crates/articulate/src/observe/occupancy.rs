@@ -20,6 +20,7 @@ pub enum Answer {
 
 /// One state's space.
 pub struct Occupancy {
+    /// The grid.
     pub lattice: Lattice,
     /// Bits 0..26: facings (see [`facing_bit`]) of surface within a voxel or so; [`FREE`].
     cells: Vec<u32>,

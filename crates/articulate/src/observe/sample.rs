@@ -7,11 +7,14 @@ use hingecast_geom::icp::Surface;
 /// A rigid motion in f32, quick to apply.
 #[derive(Clone, Copy, Debug)]
 pub struct Motion {
+    /// Rotation.
     pub rot: Mat3,
+    /// Translation, scene units.
     pub trans: Vec3,
 }
 
 impl Motion {
+    /// Where a point goes.
     #[inline]
     pub fn apply(&self, x: Vec3) -> Vec3 {
         self.rot * x + self.trans
@@ -27,8 +30,11 @@ impl From<Pose> for Motion {
 /// One oriented point of one state's surface, world frame.
 #[derive(Clone, Copy, Debug)]
 pub struct Sample {
+    /// The state that measured it.
     pub state: usize,
+    /// World frame, scene units.
     pub point: Vec3,
+    /// Unit, towards the cameras.
     pub normal: Vec3,
 }
 
@@ -38,6 +44,7 @@ impl Sample {
         Self { state, point: cloud.points[i], normal: cloud.normals[i] }
     }
 
+    /// The sample where a motion takes it.
     pub fn moved(&self, m: &Motion) -> Self {
         Self { state: self.state, point: m.apply(self.point), normal: m.rot * self.normal }
     }

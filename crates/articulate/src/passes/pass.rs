@@ -11,6 +11,7 @@ use crate::score::verdict::contradictions;
 pub struct Round<'a> {
     /// What was seen, in the states' frames as they are believed now.
     pub evidence: &'a Evidence,
+    /// Seed of everything random.
     pub seed: u64,
     /// Which of the repeated rounds this is, from 0.
     pub number: usize,
@@ -20,6 +21,7 @@ pub struct Round<'a> {
 pub struct Pass {
     /// As in `parts/trace.json` and `--set passes.skip`.
     pub name: &'static str,
+    /// What it does.
     pub run: fn(&Round, &mut Estimate),
     /// Whether the rest makes sense without it.
     pub optional: bool,

@@ -16,14 +16,18 @@ const ROBUST: f32 = 0.1;
 
 /// What pictures say about the pose of every part: gradient and Hessian by its twist (v, w), about the world's origin.
 pub struct ByPart {
+    /// By each part's twist.
     pub gradient: Vec<Vector6<f64>>,
+    /// By each part's twist, Gauss and Newton's.
     pub hessian: Vec<Matrix6<f64>>,
+    /// Sum over pixels and channels.
     pub cost: f64,
     /// Pixels that show gaussians.
     pub filled: usize,
 }
 
 impl ByPart {
+    /// Nothing seen yet.
     pub fn new(n_parts: usize) -> Self {
         Self {
             gradient: vec![Vector6::zeros(); n_parts],

@@ -19,6 +19,7 @@ fn places() -> impl Iterator<Item = (usize, usize)> {
 }
 
 impl Information {
+    /// Keeps the upper triangle of a symmetric matrix.
     pub fn new(m: &Matrix6<f64>) -> Self {
         let mut out = [0.0; 21];
         out.iter_mut().zip(places()).for_each(|(entry, at)| *entry = m[at]);

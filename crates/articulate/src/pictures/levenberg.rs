@@ -10,6 +10,7 @@ use hingecast_splat::{Engine, SplatError};
 /// What the pictures made of it.
 #[derive(Clone, Debug)]
 pub struct Refined {
+    /// Parts and joints, values counted from the first state.
     pub tree: KinematicTree,
     /// Where the parts of the gaussians really stand in the first state.
     pub first: Vec<Pose>,

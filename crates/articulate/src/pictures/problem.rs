@@ -20,7 +20,9 @@ use std::sync::Arc;
 /// A picture and the state that it shows.
 #[derive(Clone, Debug)]
 pub struct Shot {
+    /// The picture.
     pub target: Arc<Target>,
+    /// Index of the state.
     pub state: usize,
 }
 

@@ -10,7 +10,9 @@ use rayon::prelude::*;
 /// Per sample, one bit a state: where its predicted place was seen empty, and where a surface was found there.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Verdict {
+    /// States that saw the place empty.
     pub against: u64,
+    /// States that have surface there which faces the same way.
     pub support: u64,
 }
 

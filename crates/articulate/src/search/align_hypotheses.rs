@@ -29,6 +29,7 @@ pub struct Frames<'a> {
     pub parent: usize,
     /// World from the parent's canonical frame, per state, and its inverse.
     pub parent_poses: &'a [Pose],
+    /// The inverse of these poses.
     pub back: &'a [Pose],
 }
 

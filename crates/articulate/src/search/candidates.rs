@@ -40,9 +40,13 @@ const WIDE: Rule = Rule { explained: TAKEN | POSSIBLE, apart: 7.0, climbs: true 
 
 /// A screw on a parent, ready to become a part.
 pub struct Candidate {
+    /// Index of the part that it would hang on.
     pub parent: usize,
+    /// State whose samples suggested it.
     pub source: usize,
+    /// In the parent's canonical frame.
     pub screw: Screw,
+    /// Its values.
     pub sweep: Sweep,
     /// Contradictions of open samples that it removes.
     pub gain: f64,

@@ -29,6 +29,7 @@ impl<'a> Distinct<'a> {
         Self { marks, apart, keep, held: Vec::new() }
     }
 
+    /// Takes a hypothesis, unless better ones that differ fill all places.
     pub fn offer(&mut self, h: Hypothesis) {
         let full = self.held.len() == self.keep;
         if full && self.held.iter().all(|o| o.0.score >= h.score) {

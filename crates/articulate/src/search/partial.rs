@@ -5,6 +5,7 @@ use hingecast_geom::KinematicTree;
 
 /// A set of parts under construction.
 pub struct Partial {
+    /// Parts and joints so far.
     pub tree: KinematicTree,
     /// Per part, per sample.
     pub verdicts: Vec<Vec<Verdict>>,

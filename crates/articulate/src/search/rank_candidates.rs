@@ -17,6 +17,7 @@ use hingecast_geom::{KinematicTree, Pose, Screw};
 pub struct Ranked {
     /// Contradictions that it removes, times the prior, minus what a part costs.
     pub merit: f64,
+    /// With the candidate as its last part.
     pub tree: KinematicTree,
     /// Open samples that it explains.
     pub explained: Vec<Sample>,
@@ -24,13 +25,19 @@ pub struct Ranked {
 
 /// What a new part is added to, and judged by.
 pub struct Ranking<'a> {
+    /// What was seen.
     pub evidence: &'a Evidence,
+    /// The parts so far.
     pub partial: &'a Partial,
     /// Of every known part, in every state.
     pub poses: &'a [Vec<Pose>],
+    /// Of the parts so far.
     pub claims: &'a Claims,
+    /// Who judges.
     pub consensus: &'a Consensus,
+    /// What a part costs, contradictions.
     pub cost: f64,
+    /// Seed of everything random.
     pub seed: u64,
 }
 

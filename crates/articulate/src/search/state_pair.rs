@@ -7,13 +7,17 @@ use glam::Vec3;
 
 /// The moving samples of one state and the surface of another, both in the parent's canonical frame.
 pub struct StatePair<'a> {
+    /// Moving samples of the source state.
     pub source: Vec<Sample>,
+    /// Point and normal of the target state's surface where a part may land.
     pub targets: Vec<(Vec3, Vec3)>,
     /// The moving samples of the target state, in the parent's canonical frame.
     pub reverse: Vec<Sample>,
     /// Index of the target state, and its space.
     pub target: usize,
+    /// Space of the target state.
     pub space: &'a Occupancy,
+    /// Of the known parts.
     pub claims: &'a Claims,
     /// Surface with one of these claims is no place to land.
     pub explained: u8,
