@@ -3,8 +3,8 @@
 
 use crate::error::SplatError;
 use crate::pool::Shards;
+use crate::prefetch::prefetch;
 use crate::project::{MIN_LOG2_ALPHA, NO_RECT, Splat};
-use crate::raster::prefetch;
 use crate::simd::Lanes;
 use crate::view::{TILE, View};
 

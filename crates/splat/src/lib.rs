@@ -23,6 +23,7 @@ mod median;
 pub mod metrics;
 mod params;
 mod pool;
+mod prefetch;
 mod project;
 mod project_backward;
 mod raster;

@@ -11,6 +11,7 @@
 
 use crate::bins::Entry;
 use crate::pool::Shards;
+use crate::prefetch::prefetch;
 use crate::project::{MIN_LOG2_ALPHA, Splat};
 use crate::simd::Lanes;
 use crate::view::{TILE, View};
@@ -27,17 +28,6 @@ pub const MAX_EXTRA: usize = 32;
 /// Gaussians between two looks at which blocks are finished.
 const REST: usize = 16;
 const PIXELS: usize = TILE * TILE;
-
-/// Starts loading the cache line of `x`.
-#[inline(always)]
-pub(crate) fn prefetch<T>(x: &T) {
-    #[cfg(target_arch = "x86_64")]
-    unsafe {
-        core::arch::x86_64::_mm_prefetch::<0>(std::ptr::from_ref(x).cast());
-    }
-    #[cfg(not(target_arch = "x86_64"))]
-    let _ = x;
-}
 
 pub(crate) struct ForwardArgs<'a> {
     pub view: &'a View,

@@ -3,10 +3,11 @@
 //! Link frames: axes of the canonical world; origin on the joint axis nearest the part's centre of mass
 //! (revolute), at the centre of mass (prismatic), at the world origin (root). Mesh files are in link frames.
 
+use crate::link::{hull_file, link_origin, mean_color, visual_file};
 use crate::{PartModel, Twin, mjcf, urdf};
 use glam::{DVec3, Vec3};
 use hingecast_geom::ply::{PlyError, write_whole};
-use hingecast_geom::{Gaussians, Joint, Pose, TriMesh};
+use hingecast_geom::{Gaussians, Pose, TriMesh};
 use serde_json::json;
 use std::path::{Path, PathBuf};
 
@@ -18,43 +19,6 @@ pub enum ExportError {
     Io { path: PathBuf, source: std::io::Error },
     #[error(transparent)]
     Ply(#[from] PlyError),
-}
-
-/// Origin of the link frame of `part`, canonical world.
-pub fn link_origin(twin: &Twin, part: usize) -> DVec3 {
-    let com = twin.parts[part].inertial.com;
-    match twin.tree.joint_of(part) {
-        None => DVec3::ZERO,
-        Some(j) if j.screw.kind.turns() => j.screw.foot(com),
-        Some(_) => com,
-    }
-}
-
-/// Viscous damping of `joint`: not observable from still states, so chosen that a free swing loses
-/// 63 % of its speed in one second. N m s/rad or N s/m.
-pub fn damping(twin: &Twin, joint: &Joint) -> f64 {
-    let i = &twin.parts[joint.child].inertial;
-    if joint.screw.kind.turns() {
-        let about_com = joint.screw.axis.dot(i.inertia * joint.screw.axis);
-        about_com + i.mass * joint.screw.distance(i.com).powi(2)
-    } else {
-        i.mass
-    }
-}
-
-/// Mean vertex colour in [0, 1], for formats without vertex colours.
-pub fn mean_color(mesh: &TriMesh) -> [f64; 3] {
-    let n = mesh.colors.len().max(1) as f64;
-    let sum = mesh.colors.iter().fold([0.0; 3], |s, c| [0, 1, 2].map(|k| s[k] + c[k] as f64));
-    if mesh.colors.is_empty() { [0.6; 3] } else { sum.map(|s| s / n / 255.0) }
-}
-
-pub(crate) fn visual_file(part: usize) -> String {
-    format!("visual/part_{part}.obj")
-}
-
-pub(crate) fn hull_file(part: usize, hull: usize) -> String {
-    format!("collision/part_{part}_{hull}.stl")
 }
 
 /// Writes the whole folder beside `dir` and renames it into place. `splats`: gaussians in the canonical world

@@ -7,8 +7,10 @@ use rayon::prelude::*;
 /// Voxels from the surface beyond which unseen space is nobody's shell.
 const SHELL: usize = 4;
 
-/// A field's value one voxel outside a surface: fields end at [`crate::fuse::TRUNCATION`].
-pub const ONE_VOXEL: f32 = 1.0 / crate::fuse::TRUNCATION;
+/// Distances are kept up to here, voxels.
+pub const TRUNCATION: f32 = 3.0;
+/// A field's value one voxel outside a surface: fields end at [`TRUNCATION`].
+pub const ONE_VOXEL: f32 = 1.0 / TRUNCATION;
 
 /// Signed distance on a dense grid, in units of the truncation: -1 inside .. +1 outside.
 pub struct Field {

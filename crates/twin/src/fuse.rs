@@ -5,8 +5,7 @@
 //! is empty; a background pixel empties its whole ray; and what no ray ever reached counts as solid, so that
 //! closed things come out closed and have a volume. Units: scene units; frame: canonical world.
 
-use crate::field::Field;
-use crate::thin::COVER_UNIT;
+use crate::field::{Field, TRUNCATION};
 use crate::{BACKGROUND, Observation, UNKNOWN};
 use glam::Vec3;
 use hingecast_geom::{Cancelled, Pose};
@@ -17,8 +16,8 @@ use std::sync::atomic::{AtomicU32, Ordering};
 /// Voxels per block edge.
 const B: i32 = 8;
 pub(crate) const BLOCK: usize = (B * B * B) as usize;
-/// Distances are kept up to here, voxels.
-pub const TRUNCATION: f32 = 3.0;
+/// Unit in which a block counts the area that pixels stand for: this many are a voxel's face.
+pub(crate) const COVER_UNIT: f32 = 256.0;
 /// A block needs this many surface pixels: single flying pixels at depth edges open no block.
 const MIN_HITS: u32 = 3;
 /// Rays that must agree before space without any surface counts as empty.

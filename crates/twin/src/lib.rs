@@ -14,6 +14,7 @@ pub mod export;
 mod field;
 pub mod fuse;
 pub mod hulls;
+pub mod link;
 pub mod mass;
 pub mod mjcf;
 pub mod relabel;
@@ -26,6 +27,7 @@ pub mod surface;
 mod thin;
 pub mod urdf;
 mod vertices;
+mod xml;
 
 pub use build::{Config, build};
 pub use export::{ExportError, write};

@@ -1,8 +1,8 @@
 //! MJCF text of a twin: the same links and joints as the URDF, for MuJoCo.
 
 use crate::Twin;
-use crate::export::{damping, hull_file, link_origin, mean_color, visual_file};
-use crate::urdf::{escape, xyz};
+use crate::link::{damping, hull_file, link_origin, mean_color, visual_file};
+use crate::xml::{escape, xyz};
 use glam::DVec3;
 use hingecast_geom::JointKind;
 use std::fmt::Write as _;

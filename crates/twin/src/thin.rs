@@ -2,13 +2,11 @@
 //! pixels saw all the same is made solid again.
 
 use crate::field::Field;
-use crate::fuse::{BLOCK, PartVolume};
+use crate::fuse::{BLOCK, COVER_UNIT, PartVolume};
 use glam::Vec3;
 use std::collections::BTreeSet;
 use std::sync::atomic::Ordering;
 
-/// Unit in which a block counts the area that pixels stand for: this many are a voxel's face.
-pub const COVER_UNIT: f32 = 256.0;
 /// A sheet is nowhere deeper than this, where it is not lost altogether.
 const SHEET: f32 = 0.1;
 /// Surface pixels that a voxel needs.

@@ -1,8 +1,8 @@
 //! URDF text of a twin. Written by hand: the format is small, and the reader in the tests is someone else's.
 
 use crate::Twin;
-use crate::export::{damping, hull_file, link_origin, mean_color, visual_file};
-use glam::DVec3;
+use crate::link::{damping, hull_file, link_origin, mean_color, visual_file};
+use crate::xml::{escape, xyz};
 use hingecast_geom::JointKind;
 use std::fmt::Write as _;
 
@@ -78,13 +78,4 @@ pub fn to_string(twin: &Twin) -> String {
 
 fn path(file: &str) -> String {
     format!("meshes/{file}")
-}
-
-pub(crate) fn xyz(v: DVec3) -> String {
-    format!("{:.9} {:.9} {:.9}", v.x, v.y, v.z)
-}
-
-/// Names come from users' folders: the five XML characters must not break the file.
-pub(crate) fn escape(name: &str) -> String {
-    name.replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;").replace('"', "&quot;").replace('\'', "&apos;")
 }

@@ -127,7 +127,7 @@ fn sizes_masses_and_joints_come_back() {
     let top = inner.fold(f32::MIN, |a, v| a.max(v.z));
     assert!(top < 0.035, "the floor of the box is at 0.02, found {top}");
     // Colours went to the right parts.
-    let lid = hingecast_twin::export::mean_color(&twin.parts[1].mesh);
+    let lid = hingecast_twin::link::mean_color(&twin.parts[1].mesh);
     assert!(lid[1] > 0.5 && lid[0] < 0.2, "{lid:?}");
 
     let dir = tempfile::tempdir().unwrap();
@@ -143,7 +143,7 @@ fn sizes_masses_and_joints_come_back() {
         assert!(folder.join(filename).exists());
     }
     // Link frame: on the axis, beside the lid's centre of mass.
-    let origin = hingecast_twin::export::link_origin(&twin, 1);
+    let origin = hingecast_twin::link::link_origin(&twin, 1);
     assert!((origin - DVec3::new(-0.2, 0.0, 0.2)).length() < 0.01, "{origin}");
 }
 
