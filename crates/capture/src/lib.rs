@@ -18,5 +18,5 @@ pub mod truth;
 
 /// What is wrong with a recording, an object or a plan of one.
 pub use hingecast_geom::InputError as CaptureError;
-pub use recording::{Frame, Recording, Split, View, ViewCache};
+pub use recording::{Frame, PackedDepth, Recording, Split, View, ViewCache};
 pub use truth::Truth;

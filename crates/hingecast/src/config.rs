@@ -1,7 +1,7 @@
 //! The resolved configuration of a build: preset < config file < flags and `--set`.
 
 use crate::failure::{Failure, Result};
-use crate::pipeline::overrides::JointOverride;
+use crate::overrides::JointOverride;
 use hingecast_articulate as articulate;
 use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};

@@ -1,5 +1,7 @@
 //! The facade: stages, configuration, evaluation, reports and benches behind the `hingecast` binary.
 
+pub mod artifacts;
+pub mod build;
 pub mod chart;
 pub mod config;
 pub mod eval;
@@ -7,11 +9,12 @@ pub mod eval;
 pub mod experiment;
 pub mod failure;
 pub mod import_object;
-pub mod pipeline;
+pub mod overrides;
 pub mod report;
-pub mod run;
 #[cfg(feature = "mujoco")]
 pub mod simulate;
 pub mod stage;
+pub mod stages;
 pub mod training;
 pub mod ui;
+pub mod watcher;

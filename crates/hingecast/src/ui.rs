@@ -1,6 +1,7 @@
 //! What a person sees while a stage runs: a bar with ETA on a terminal, a line now and then elsewhere.
 //! Everything human goes to stderr; stdout is for `--json`.
 
+use crate::watcher::Watcher;
 use hingecast_geom::Progress;
 use indicatif::{ProgressBar, ProgressStyle};
 use std::io::IsTerminal;
@@ -32,6 +33,7 @@ impl Ui {
         Self { cancel, quiet }
     }
 
+    /// A line for people.
     pub fn say(&self, text: &str) {
         if !self.quiet {
             eprintln!("{text}");
@@ -76,6 +78,16 @@ impl Ui {
             },
             cancel,
         )
+    }
+}
+
+impl Watcher for Ui {
+    fn stage(&self, name: &str) -> Progress {
+        self.stage(name)
+    }
+
+    fn say(&self, line: &str) {
+        self.say(line);
     }
 }
 

@@ -3,6 +3,7 @@
 //! Decoding three PNGs takes milliseconds, expanding a packed view a tenth of one. So views are kept packed, 6 bytes a
 //! pixel, and the least recently used leave when the budget is full: 1500 views at 256 x 256 fit 590 MB.
 
+use super::packed_depth::PackedDepth;
 use super::{Recording, View, view};
 use crate::CaptureError;
 use rayon::prelude::*;
@@ -32,12 +33,6 @@ struct Packed {
     flags: Vec<u8>,
 }
 
-enum PackedDepth {
-    None,
-    Stored { units: Vec<u16>, scale: f32 },
-    Full(Vec<f32>),
-}
-
 impl ViewCache {
     /// `budget_bytes` bounds what is kept between calls; views that callers hold come on top.
     pub fn new(recording: &Recording, budget_bytes: usize) -> Self {
@@ -60,6 +55,20 @@ impl ViewCache {
         let scale = self.recording.frames[frame].depth_scale as f32;
         self.keep(frame, Arc::new(Packed::new(&view, scale)));
         Ok(Arc::new(view))
+    }
+
+    /// The decoded view of a frame, which is not kept any longer.
+    ///
+    /// # Errors
+    /// As [`Recording::load`].
+    pub fn take(&self, frame: usize) -> Result<View, CaptureError> {
+        let gone = {
+            let mut kept = self.lock();
+            let gone = kept.views.remove(&frame);
+            kept.bytes -= gone.as_ref().map_or(0, |(_, packed)| packed.bytes());
+            gone
+        };
+        gone.map_or_else(|| self.recording.load(frame), |(_, packed)| Ok(packed.unpack()))
     }
 
     /// Decodes frames in parallel so that later `get`s are quick; stops adding when the budget is full.
@@ -122,40 +131,21 @@ impl ViewCache {
 impl Packed {
     fn new(view: &View, scale: f32) -> Self {
         let flags = view.mask.iter().zip(&view.usable).map(|(m, u)| m | u << 1).collect();
-        // Depth that came from 16-bit files goes back to it exactly; anything else stays as it is.
-        let units =
-            || view.depth.iter().map(|&z| (z / scale).round()).map(|u| (0.0..65536.0).contains(&u).then_some(u as u16));
-        let depth = match units().collect::<Option<Vec<u16>>>() {
-            _ if view.depth.is_empty() => PackedDepth::None,
-            Some(units) if units.iter().zip(&view.depth).all(|(&u, &z)| f32::from(u) * scale == z) => {
-                PackedDepth::Stored { units, scale }
-            }
-            _ => PackedDepth::Full(view.depth.clone()),
-        };
+        let depth = PackedDepth::new(&view.depth, scale);
         Self { camera: view.camera, rgb: view.rgb.clone(), depth, flags }
     }
 
     fn unpack(&self) -> View {
-        let depth = match &self.depth {
-            PackedDepth::None => Vec::new(),
-            PackedDepth::Stored { units, scale } => units.iter().map(|&u| f32::from(u) * scale).collect(),
-            PackedDepth::Full(depth) => depth.clone(),
-        };
         view::View {
             camera: self.camera,
             rgb: self.rgb.clone(),
-            depth,
+            depth: self.depth.unpack(),
             mask: self.flags.iter().map(|f| f & 1).collect(),
             usable: self.flags.iter().map(|f| f >> 1).collect(),
         }
     }
 
     fn bytes(&self) -> usize {
-        let depth = match &self.depth {
-            PackedDepth::None => 0,
-            PackedDepth::Stored { units, .. } => 2 * units.len(),
-            PackedDepth::Full(depth) => 4 * depth.len(),
-        };
-        self.rgb.len() + self.flags.len() + depth + size_of::<Self>()
+        self.rgb.len() + self.flags.len() + self.depth.bytes() + size_of::<Self>()
     }
 }

@@ -9,11 +9,13 @@ mod cache;
 mod fields;
 mod fingerprint;
 pub mod images;
+mod packed_depth;
 pub(crate) mod transforms;
 mod view;
 mod write;
 
 pub use cache::ViewCache;
+pub use packed_depth::PackedDepth;
 pub use view::View;
 
 use crate::CaptureError;

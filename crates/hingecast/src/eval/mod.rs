@@ -7,9 +7,9 @@ pub mod parts;
 pub mod pictures;
 pub mod surfaces;
 
+use crate::artifacts::TwinFile;
 use crate::failure::{Failure, Result};
-use crate::run;
-use crate::stage::{RunFolder, read_json, write_json};
+use crate::stage::{RunFolder, write_json};
 use hingecast_capture::{Recording, Truth, ViewCache};
 use hingecast_geom::{KinematicTree, Progress, TriMesh};
 use serde::{Deserialize, Serialize};
@@ -61,7 +61,7 @@ impl Evaluation {
 pub fn evaluate(run: &Path, truth: &Path, progress: &Progress) -> Result<Evaluation> {
     let folder = RunFolder::open(run)?;
     let truth = Truth::open(truth)?;
-    let twin: run::TwinFile = read_json(&folder.folder("twin").join("twin.json"))?;
+    let twin = TwinFile::read(run)?;
     let recording = recording_of(&folder, &truth)?;
     let cache = ViewCache::new(&recording, 512 << 20);
 

@@ -3,8 +3,8 @@
 use super::joints::{JointErrors, errors};
 use super::matching::{POINTS, match_points, surface_points};
 use super::{recording_of, reference_meshes, tree_accuracy};
+use crate::artifacts::{Joints, Parts, samples};
 use crate::failure::Result;
-use crate::pipeline::{joints, labelled, screw};
 use crate::stage::RunFolder;
 use hingecast_capture::Truth;
 use serde::{Deserialize, Serialize};
@@ -31,12 +31,12 @@ pub fn evaluate_parts(run: &Path, truth: &Path) -> Result<PartsEvaluation> {
     let folder = RunFolder::open(run)?;
     let truth = Truth::open(truth)?;
     recording_of(&folder, &truth)?;
-    let found = screw::load(run)?;
+    let found = Parts::read(run)?;
     // Where pictures had a say, theirs is the last word.
-    let tree = if folder.has("joints") { joints::load(run)?.tree } else { found.tree };
+    let tree = if folder.has("joints") { Joints::read(run)?.tree } else { found.tree };
     let meshes = reference_meshes(&truth)?;
     let true_points = surface_points(&meshes);
-    let found_points = labelled::canonical_points(run, &tree, POINTS)?;
+    let found_points = samples::canonical_points(&samples::read(run)?, &tree, POINTS);
     let matching = match_points(&found_points, &true_points, &tree, &truth.tree);
     Ok(PartsEvaluation {
         object: truth.object.clone(),

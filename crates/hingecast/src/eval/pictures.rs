@@ -1,9 +1,10 @@
 //! Held-out pictures: the twin's gaussians rendered where no training camera stood.
 
+use crate::artifacts::{Joints, Splats};
 use crate::failure::Result;
-use crate::pipeline::labels::Labeller;
-use crate::pipeline::{joints, splat};
 use crate::stage::RunFolder;
+use crate::stages::labeller::Labeller;
+use crate::stages::targets;
 use hingecast_capture::{Recording, Split, Truth, ViewCache};
 use hingecast_geom::{KinematicTree, Progress};
 use hingecast_splat::metrics;
@@ -52,10 +53,10 @@ pub fn errors(
     matching: &[Option<usize>],
     progress: &Progress,
 ) -> Result<(PictureErrors, PictureErrors)> {
-    let (gaussians, _) = splat::load(&run.root)?;
-    let found = joints::load(&run.root)?;
+    let gaussians = Splats::read(&run.root)?.gaussians;
+    let found = Joints::read(&run.root)?;
     let cache = ViewCache::new(recording, 64 << 20);
-    let background = splat::background(recording, &cache)?;
+    let background = targets::background(recording, &cache)?;
     let mut labeller = Labeller::new(&gaussians, &found.labels, run.record.threads)?;
     let (mut first, mut others) = (PictureErrors::default(), PictureErrors::default());
     for state in 0..recording.n_states {
@@ -65,7 +66,7 @@ pub fn errors(
             let view = recording.load(f)?;
             let picture = labeller.render(&view.camera, background.0)?;
             let (w, h) = (view.camera.width, view.camera.height);
-            let photo = splat::photo(&view, background);
+            let photo = targets::photo(&view, background);
             let true_mask: Vec<f32> = view.mask.iter().map(|m| *m as f32).collect();
             let labels = truth.labels(&recording.frames[f].color)?;
             let one = PictureErrors {

@@ -8,11 +8,11 @@ pub mod rollout;
 #[cfg(feature = "mujoco")]
 mod rollout_plot;
 
+use crate::artifacts::{Joints, Splats, TwinFile};
 use crate::failure::{Failure, Result};
-use crate::pipeline::labels::Labeller;
-use crate::pipeline::{joints, splat};
-use crate::run::TwinFile;
-use crate::stage::{RunFolder, read_json};
+use crate::stage::RunFolder;
+use crate::stages::labeller::Labeller;
+use crate::stages::targets;
 use glam::{DVec3, Vec3};
 use hingecast_capture::{Recording, Split, ViewCache};
 use hingecast_geom::KinematicTree;
@@ -42,12 +42,12 @@ pub(crate) struct Content {
 pub fn write(run: &RunFolder) -> Result<PathBuf> {
     let folder = run.folder("report");
     std::fs::create_dir_all(&folder).map_err(Failure::io(&folder))?;
-    let twin: TwinFile = read_json(&run.folder("twin").join("twin.json"))?;
+    let twin = TwinFile::read(&run.root)?;
     let recording = Recording::open(&run.record.recording)?;
-    let (gaussians, extent) = splat::load(&run.root)?;
-    let found = joints::load(&run.root)?;
+    let Splats { gaussians, extent, .. } = Splats::read(&run.root)?;
+    let found = Joints::read(&run.root)?;
     let cache = ViewCache::new(&recording, 64 << 20);
-    let background = splat::background(&recording, &cache)?;
+    let background = targets::background(&recording, &cache)?;
     let mut labeller = Labeller::new(&gaussians, &found.labels, run.record.threads.max(1))?;
     let centres = part_centres(&gaussians.means, &found.labels, found.tree.parts.len());
 
@@ -82,7 +82,7 @@ pub fn write(run: &RunFolder) -> Result<PathBuf> {
             let view = recording.load(f)?;
             let (w, h) = (view.camera.width, view.camera.height);
             let picture = labeller.render(&view.camera, background.0)?;
-            let photo = splat::photo(&view, background);
+            let photo = targets::photo(&view, background);
             let file = format!("held_out_{f:05}.png");
             let (left, right) = (draw::from_rgb_f32(&photo, w, h), draw::from_rgb_f32(&picture.rgb, w, h));
             let difference = draw::difference(&left, &right);

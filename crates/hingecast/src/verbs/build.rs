@@ -2,9 +2,9 @@
 
 use super::{Outcome, Session};
 use crate::cli::{Build, BuildSettings};
+use hingecast::build::{Options, Stage};
 use hingecast::config::{Config, Method};
 use hingecast::failure::{Failure, Result};
-use hingecast::pipeline::{self, Span, stages};
 use hingecast::report;
 use hingecast::stage::RunFolder;
 use std::path::{Path, PathBuf};
@@ -25,34 +25,31 @@ pub fn run_folder(out: Option<&Path>, recording: &Path) -> PathBuf {
     out.map_or_else(|| Path::new("runs").join(name), Path::to_path_buf)
 }
 
-/// Stage names that are not there, and `--from` after `--to`: it would do nothing and say that it is done. Asked
-/// before anything is thrown away.
-fn refuse_odd_span(args: &Build, method: Method) -> Result<()> {
-    let stages = stages(method);
-    let refuse = |what: String| {
-        Err(Failure::new(what, "--from / --to", format!("the stages are, in order: {}", stages.join(", "))))
-    };
-    let place = |name: &str| stages.iter().position(|s| *s == name);
-    for name in [&args.from, &args.to].into_iter().flatten() {
-        if place(name).is_none() {
-            return refuse(format!("no stage '{name}'"));
-        }
+/// What to run. Stage names that are not there, and `--from` after `--to` (it would do nothing and say that it is done), are refused before
+/// anything is thrown away.
+fn options(session: &Session, args: &Build, method: Method) -> Result<Options> {
+    let named = |name: &Option<String>| name.as_deref().map(|n| Stage::named(n, method)).transpose();
+    let (from, to) = (named(&args.from)?, named(&args.to)?);
+    let place = |stage: Stage| Stage::all(method).iter().position(|s| *s == stage);
+    if let (Some(first), Some(last)) = (from, to)
+        && place(first) > place(last)
+    {
+        let names: Vec<&str> = Stage::all(method).iter().map(|s| s.name()).collect();
+        return Err(Failure::new(
+            format!("'{}' comes after '{}': nothing is left to do", first.name(), last.name()),
+            "--from / --to",
+            format!("the stages are, in order: {}", names.join(", ")),
+        ));
     }
-    match (&args.from, &args.to) {
-        (Some(from), Some(to)) if place(from) > place(to) => {
-            refuse(format!("'{from}' comes after '{to}': nothing is left to do"))
-        }
-        _ => Ok(()),
-    }
+    Ok(Options { from, to, fresh: args.fresh, ..session.options() })
 }
 
 pub fn run(session: &Session, args: &Build) -> Result<Outcome> {
     let out = run_folder(args.out.as_deref(), &args.recording);
     RunFolder::may_become_run(&out)?;
     let config = config(&args.settings)?;
-    refuse_odd_span(args, config.method)?;
-    let span = Span { from: args.from.clone(), to: args.to.clone(), fresh: args.fresh };
-    let run = pipeline::build(&args.recording, &out, &config, session.threads, &span, &session.ui)?;
+    let options = options(session, args, config.method)?;
+    let run = hingecast::build::build(&args.recording, &out, &config, &options, &session.ui)?;
     if let Some(to) = args.to.as_deref().filter(|to| *to != "twin") {
         session.ui.say(&format!("stopped after {to}, as asked; run again without --to for the twin"));
         session.answer(&serde_json::json!({ "run": run.root, "to": to, "secs": run.record.total_secs() }));

@@ -1,11 +1,10 @@
 //! `hingecast demo`: record, build, evaluate, report, in one go and a few minutes.
 
-use super::{Outcome, Session, bench, synth, table};
+use super::{Outcome, Session, suite, synth, table};
 use crate::cli::Demo;
 use hingecast::config::{Config, Preset};
 use hingecast::eval::evaluate;
 use hingecast::failure::Result;
-use hingecast::pipeline::{self, Span};
 use hingecast::report;
 use hingecast::stage::RunFolder;
 use hingecast_capture::Truth;
@@ -13,7 +12,7 @@ use hingecast_capture::synth::SynthConfig;
 use std::path::Path;
 
 pub fn run(session: &Session, args: &Demo) -> Result<Outcome> {
-    let out = args.out.clone().unwrap_or_else(|| Path::new("runs/demo").join(bench::name_of(&args.object)));
+    let out = args.out.clone().unwrap_or_else(|| Path::new("runs/demo").join(suite::name_of(&args.object)));
     let (recording, run) = (out.join("recording"), out.join("run"));
     RunFolder::may_become_run(&run)?;
     if !recording.join("transforms.json").exists() {
@@ -21,7 +20,7 @@ pub fn run(session: &Session, args: &Demo) -> Result<Outcome> {
         synth::record(session, &args.object, &config, &recording)?;
     }
     let config = Config::preset(Preset::Fast);
-    let folder = pipeline::build(&recording, &run, &config, session.threads, &Span::default(), &session.ui)?;
+    let folder = hingecast::build::build(&recording, &run, &config, &session.options(), &session.ui)?;
     let page = report::write(&folder)?;
     let evaluation = evaluate(&run, &Truth::folder_of(&recording), &session.ui.stage("eval"))?;
     session.ui.say(&format!("\n{}", table::detail(&evaluation)));

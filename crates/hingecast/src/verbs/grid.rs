@@ -1,12 +1,13 @@
 //! `hingecast bench --joints`: parts and joints of every object under every protocol and seed.
 
-use super::bench::{Named, record_once};
+use super::suite::{Named, record_once};
 use super::{Outcome, Session, build, synth};
 use crate::cli::Bench;
+use hingecast::artifacts::Parts;
+use hingecast::build::{Options, Stage};
 use hingecast::config::Config;
 use hingecast::eval::parts::{PartsEvaluation, evaluate_parts};
 use hingecast::failure::{Failure, Result};
-use hingecast::pipeline::{self, Span};
 use hingecast::stage::write_json;
 use hingecast_capture::Truth;
 use hingecast_capture::synth::{Noise, SynthConfig};
@@ -88,14 +89,14 @@ fn one(
 ) -> Result<PartsEvaluation> {
     let (recording, run) = (place.join("recordings").join(&object.name), place.join("runs").join(&object.name));
     record_once(session, &object.argument, synth_config, &recording)?;
-    let build_to = |stage: &str| {
-        let span = Span { to: Some(stage.into()), ..Span::default() };
-        pipeline::build(&recording, &run, build_config, session.threads, &span, &session.ui)
+    let build_to = |stage: Stage| {
+        let options = Options { to: Some(stage), ..session.options() };
+        hingecast::build::build(&recording, &run, build_config, &options, &session.ui)
     };
-    build_to("parts")?;
-    if !pipeline::screw::load(&run)?.information.is_empty() {
+    build_to(Stage::Parts)?;
+    if !Parts::read(&run)?.information.is_empty() {
         // Noise: the pictures are asked as well.
-        build_to("joints")?;
+        build_to(Stage::Joints)?;
     }
     let evaluation = evaluate_parts(&run, &Truth::folder_of(&recording))?;
     if tidy {

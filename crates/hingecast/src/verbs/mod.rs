@@ -15,6 +15,7 @@ mod import;
 mod import_object;
 #[cfg(feature = "mujoco")]
 mod rollout;
+mod suite;
 mod synth;
 mod table;
 mod train;
@@ -38,6 +39,11 @@ pub struct Session {
 }
 
 impl Session {
+    /// How builds run.
+    pub fn options(&self) -> hingecast::build::Options {
+        hingecast::build::Options { threads: self.threads, ..Default::default() }
+    }
+
     /// The machine's answer, when it was asked for.
     pub fn answer(&self, value: &impl serde::Serialize) {
         if self.json {

@@ -7,7 +7,6 @@ use hingecast::experiment::steps::Steps;
 use hingecast::experiment::{Demonstrated, Row, TwinError, World};
 use hingecast::failure::{Failure, Result};
 use hingecast::import_object::{ImportConfig, import};
-use hingecast::pipeline::{self, Span};
 use hingecast::simulate::record::record_on;
 use hingecast::simulate::rollout::{EpisodeResult, episodes, strips};
 use hingecast::simulate::twin_file;
@@ -202,7 +201,7 @@ impl Cast<'_> {
         let run = self.root.join(if classical { "run_track" } else { "run" });
         let fingerprint = Recording::open(recording)?.fingerprint()?;
         let stamp = self.steps.step(kind, kind, &[&fingerprint, config], &run.join("twin/robot.xml"), || {
-            let folder = pipeline::build(recording, &run, config, session.threads, &Span::default(), &session.ui)?;
+            let folder = hingecast::build::build(recording, &run, config, &session.options(), &session.ui)?;
             report::write(&folder).map(|_| ())
         })?;
         Ok(Model { file: twin_file(&run)?, stamp })

@@ -1,11 +1,7 @@
 //! The measured surface of a state: masked depth pixels as points with normals, world frame.
 
-use super::Context;
-use crate::failure::Result;
 use glam::{DVec2, DVec3, Vec3};
-use hingecast_capture::{Split, View};
-use hingecast_geom::icp::Surface;
-use rayon::prelude::*;
+use hingecast_capture::View;
 
 /// Calls `emit(point, pixel index)` for every `stride`-th usable depth pixel of the object.
 pub fn unproject(view: &View, stride: usize, emit: &mut dyn FnMut(DVec3, usize)) {
@@ -44,27 +40,4 @@ pub fn normal(view: &View, i: usize) -> Option<Vec3> {
     let n = if n.dot(to_camera) < 0.0 { -n } else { n };
     // A step of depth between neighbours makes a "surface" that nearly faces sideways.
     (n.dot(to_camera) > 0.25).then(|| n.as_vec3())
-}
-
-/// The surface of `state` from about `wanted` pixels spread over all its training views.
-pub fn of_state(context: &Context, state: usize, wanted: usize) -> Result<Surface> {
-    let frames = context.recording.frames_of(state, Split::Train);
-    let views = frames.par_iter().map(|&f| context.view(f)).collect::<Result<Vec<_>>>()?;
-    let pixels: usize = views.iter().map(|v| v.mask.iter().filter(|m| **m == 1).count()).sum();
-    let stride = ((pixels as f64 / wanted as f64).sqrt().round() as usize).max(1);
-    let parts: Vec<(Vec<Vec3>, Vec<Vec3>)> = views
-        .par_iter()
-        .map(|view| {
-            let (mut points, mut normals) = (Vec::new(), Vec::new());
-            unproject(view, stride, &mut |x, i| {
-                if let Some(n) = normal(view, i) {
-                    points.push(x.as_vec3());
-                    normals.push(n);
-                }
-            });
-            (points, normals)
-        })
-        .collect();
-    let (points, normals): (Vec<_>, Vec<_>) = parts.into_iter().unzip();
-    Ok(Surface::new(points.concat(), normals.concat()))
 }

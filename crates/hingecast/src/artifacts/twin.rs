@@ -1,6 +1,7 @@
-//! Reading what a build left: `twin.json` and its meshes.
+//! `twin/twin.json` and its meshes, as other verbs need them.
 
 use crate::failure::Result;
+use crate::stage::read_json;
 use glam::DVec3;
 use hingecast_geom::{Certainty, KinematicTree, Pose, TriMesh};
 use serde::Deserialize;
@@ -32,6 +33,14 @@ pub struct PartFile {
 }
 
 impl TwinFile {
+    /// Of a finished run.
+    ///
+    /// # Errors
+    /// When the file is missing or not ours.
+    pub fn read(run: &Path) -> Result<Self> {
+        read_json(&run.join("twin").join("twin.json"))
+    }
+
     /// Visual meshes in the canonical world frame.
     pub fn meshes(&self, folder: &Path) -> Result<Vec<TriMesh>> {
         self.parts

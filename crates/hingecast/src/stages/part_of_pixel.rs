@@ -1,49 +1,13 @@
-//! `parts/samples.ply`: the surface of every state, sample by sample, with its part; and what it says about pixels.
+//! Which part a pixel shows, by the labelled samples of its state.
 
-use super::{Context, placed, screw, surface};
-use crate::failure::{Failure, Result};
+use super::pixels;
 use glam::Vec3;
-use hingecast_articulate::label::labelled::{Labelled, far_off_plane};
-use hingecast_geom::ply::{read_vertices, write_float_vertices};
-use hingecast_geom::{KinematicTree, PointTree, Pose};
+use hingecast_articulate::Labelled;
+use hingecast_articulate::label::labelled::far_off_plane;
+use hingecast_capture::View;
+use hingecast_geom::{PointTree, Pose};
 use hingecast_twin::{BACKGROUND, UNKNOWN};
 use rayon::prelude::*;
-use std::path::Path;
-
-const COLUMNS: [&str; 5] = ["x", "y", "z", "state", "part"];
-
-pub fn write(at: &Path, samples: &[Labelled]) -> Result<()> {
-    let row = |s: &Labelled| [s.point.x, s.point.y, s.point.z, s.state as f32, s.part as f32];
-    let rows: Vec<f32> = samples.iter().flat_map(row).collect();
-    Ok(write_float_vertices(&at.join("samples.ply"), &COLUMNS.map(String::from), &rows)?)
-}
-
-fn load(run: &Path) -> Result<Vec<Labelled>> {
-    let path = run.join("parts").join("samples.ply");
-    let table = read_vertices(&path)?;
-    if table.names != COLUMNS {
-        let place = path.display().to_string();
-        return Err(Failure::new("not a file of labelled samples", place, "build again with --from parts"));
-    }
-    let row = |r: &[f32]| Labelled { point: Vec3::new(r[0], r[1], r[2]), state: r[3] as usize, part: r[4] as u8 };
-    Ok(table.data.chunks_exact(COLUMNS.len()).map(row).collect())
-}
-
-/// At most `most` points of every part's surface, where the first state has it.
-pub fn canonical_points(run: &Path, tree: &KinematicTree, most: usize) -> Result<Vec<Vec<Vec3>>> {
-    let mut out = vec![Vec::new(); tree.parts.len()];
-    let n_states = tree.joints.first().map_or(1, |j| j.values.len());
-    let back: Vec<Vec<Pose>> = (0..n_states).map(|s| tree.poses_at(s).iter().map(Pose::inverse).collect()).collect();
-    for s in load(run)? {
-        let pose = &back[s.state.min(n_states - 1)][s.part as usize];
-        out[s.part as usize].push(pose.apply(s.point.as_dvec3()).as_vec3());
-    }
-    for points in &mut out {
-        let stride = points.len().div_ceil(most).max(1);
-        *points = points.iter().step_by(stride).copied().collect();
-    }
-    Ok(out)
-}
 
 /// A state's labelled samples, to be asked for the part of what lies near them.
 pub struct LabelledSurface {
@@ -97,36 +61,29 @@ impl LabelledSurface {
 }
 
 /// The labelled samples of every state; `state_from_world`: how far each state's world has been moved since, if it has.
-pub fn surfaces(run: &Path, n_states: usize, state_from_world: &[Pose]) -> Result<Vec<LabelledSurface>> {
-    let labelled = load(run)?;
+pub fn surfaces(labelled: &[Labelled], n_states: usize, state_from_world: &[Pose]) -> Vec<LabelledSurface> {
     let of_state = |state: usize| {
         let own: Vec<&Labelled> = labelled.iter().filter(|s| s.state == state).collect();
         let back = state_from_world.get(state).map_or(Pose::IDENTITY, Pose::inverse);
         let points: Vec<Vec3> = own.iter().map(|s| back.apply(s.point.as_dvec3()).as_vec3()).collect();
         LabelledSurface::new(points, own.iter().map(|s| s.part).collect())
     };
-    Ok((0..n_states).into_par_iter().map(of_state).collect())
+    (0..n_states).into_par_iter().map(of_state).collect()
 }
 
-/// Part of every pixel of `frames`: that of the labelled sample of its state which lies nearest in its plane.
-pub fn pixel_labels(context: &Context, run: &Path, frames: &[usize]) -> Result<Vec<Vec<u8>>> {
-    let by_state = surfaces(run, context.recording.n_states, &placed::load(run)?.state_from_world)?;
-    let reach = (2.0 * screw::load(run)?.voxel).powi(2);
-    let of_frame = |&f: &usize| -> Result<Vec<u8>> {
-        let view = context.view(f)?;
-        let surface = &by_state[context.recording.frames[f].state];
-        let silent = |i: usize| {
-            if view.usable[i] == 1 && view.mask[i] == 0 && !(view.depth[i] > 0.0) { BACKGROUND } else { UNKNOWN }
-        };
-        let mut out: Vec<u8> = (0..view.mask.len()).map(silent).collect();
-        surface::unproject(&view, 1, &mut |x, i| {
-            if let Some(part) = surface.part_at(x.as_vec3(), surface::normal(&view, i), reach) {
-                out[i] = part;
-            }
-        });
-        Ok(out)
+/// Part of every pixel of a view: that of the labelled sample of its state which lies nearest in its plane, if one is within
+/// `reach` (squared, scene units).
+pub fn parts_of_pixels(view: &View, surface: &LabelledSurface, reach: f32) -> Vec<u8> {
+    let silent = |i: usize| {
+        if view.usable[i] == 1 && view.mask[i] == 0 && !(view.depth[i] > 0.0) { BACKGROUND } else { UNKNOWN }
     };
-    frames.par_iter().map(of_frame).collect()
+    let mut out: Vec<u8> = (0..view.mask.len()).map(silent).collect();
+    pixels::unproject(view, 1, &mut |x, i| {
+        if let Some(part) = surface.part_at(x.as_vec3(), pixels::normal(view, i), reach) {
+            out[i] = part;
+        }
+    });
+    out
 }
 
 #[cfg(test)]

@@ -1,103 +1,70 @@
 //! Stage `splat` of `--method screw`: one set of gaussians for all states, fitted with every part in its place; and what the pictures
 //! then say about these places.
 
-use super::splat::{self, Extent};
-use super::{Context, labelled, screw};
+use super::fit_gaussians::fit_gaussians;
+use super::inputs::Inputs;
+use super::part_of_pixel::surfaces;
+use super::targets::target;
+use crate::artifacts::{Extent, Parts, Placed, Splats};
 use crate::failure::Result;
-use crate::stage::{read_json, write_json};
+use hingecast_articulate::Labelled;
 use hingecast_articulate::pictures::levenberg::refine_by_pictures;
 use hingecast_articulate::pictures::problem::Shot;
-use hingecast_capture::{Recording, Split};
-use hingecast_geom::{KinematicTree, Pose};
+use hingecast_geom::{Pose, Progress};
 use hingecast_splat::{Engine, SurfaceSample, Target, Views, from_surface, surface_samples};
 use rayon::prelude::*;
-use serde::{Deserialize, Serialize};
-use std::collections::BTreeMap;
 use std::path::Path;
 use std::sync::Arc;
 
-/// `splat/placed.json`
-#[derive(Serialize, Deserialize)]
-pub struct Placed {
-    /// Of every gaussian.
-    pub parts: Vec<u8>,
-    /// By depth and pictures.
-    pub tree: KinematicTree,
-    /// Per state: what its cameras, as the stage before left them, take for the world, from the world. Empty where depth had the
-    /// last word.
-    pub state_from_world: Vec<Pose>,
-    /// What the tree cost before the pictures were asked, and after.
-    pub nats: [f64; 2],
-}
-
-impl Placed {
-    /// Corrects cameras (camera_from_world by frame) by what their states' worlds were off.
-    pub fn correct(&self, recording: &Recording, cameras: &mut BTreeMap<usize, Pose>) {
-        for (frame, camera) in cameras {
-            if let Some(state) = self.state_from_world.get(recording.frames[*frame].state) {
-                *camera = *camera * *state;
-            }
-        }
-    }
-}
-
-pub fn load(run: &Path) -> Result<Placed> {
-    read_json(&run.join("splat").join("placed.json"))
-}
-
 /// Gaussians of the whole object in its first state, fitted to views of all states with every part in its place.
-pub fn run(context: &Context, run: &Path, at: &Path) -> Result<()> {
-    let found = screw::load(run)?;
-    let recording = context.recording;
-    let progress = context.ui.stage("splat");
-    let frames = spread(context);
-    let (lo, hi) = splat::extent(context, &[0])?;
+pub fn run(inputs: &Inputs, found: &Parts, labelled: &[Labelled], at: &Path, progress: &Progress) -> Result<Splats> {
+    let recording = inputs.recording;
+    let frames = spread(inputs);
+    let (lo, hi) = inputs.extent(&[0])?;
     let extent = Extent { lo: lo.to_array(), hi: hi.to_array(), diagonal: (hi - lo).length() };
     let targets: Vec<Arc<Target>> = frames
         .par_iter()
-        .map(|&f| Ok(Arc::new(splat::target(&context.view(f)?, context.background)?)))
+        .map(|&f| Ok(Arc::new(target(&inputs.view(f)?, inputs.background)?)))
         .collect::<Result<_>>()?;
     let poses: Vec<Vec<Pose>> = (0..recording.n_states).map(|s| found.tree.poses_at(s)).collect();
     let state_of = |view: usize| recording.frames[frames[view]].state;
 
-    let samples = canonical_samples(context, run, &targets, &state_of, &poses, extent.diagonal)?;
-    let (first, groups) = from_surface(&samples, context.config.fit.gaussians);
+    let samples = canonical_samples(inputs, labelled, &targets, &state_of, &poses, extent.diagonal)?;
+    let (first, groups) = from_surface(&samples, inputs.config.fit.gaussians);
     drop(samples);
-    let mut engine = Engine::from_gaussians(&first, context.threads)?;
+    let mut engine = Engine::from_gaussians(&first, inputs.threads)?;
     engine.set_groups(&groups, &poses[0])?;
     let get = |i: usize| targets[i].clone();
     let pose = |i: usize| poses[state_of(i)].clone();
     let views = Views { count: targets.len(), get: &get, poses: Some(&pose) };
-    let mut gaussians = splat::fit(context, engine, &views, at, &progress)?;
+    let mut gaussians = fit_gaussians(inputs, engine, &views, at, progress)?;
     let mut placed = Placed {
         parts: groups.iter().map(|g| *g as u8).collect(),
-        tree: found.tree,
+        tree: found.tree.clone(),
         state_from_world: Vec::new(),
         nats: [0.0; 2],
     };
     if !found.information.is_empty() {
         let shot = |(v, target): (usize, &Arc<Target>)| Shot { target: target.clone(), state: state_of(v) };
         let shots: Vec<Shot> = targets.iter().enumerate().map(shot).collect();
-        let mut engine = Engine::from_gaussians(&gaussians, context.threads)?;
+        let mut engine = Engine::from_gaussians(&gaussians, inputs.threads)?;
         engine.set_groups(&groups, &poses[0])?;
-        let refined = refine_by_pictures(&mut engine, &shots, &placed.tree, &found.information, &progress)?;
+        let refined = refine_by_pictures(&mut engine, &shots, &placed.tree, &found.information, progress)?;
         groups.iter().enumerate().for_each(|(i, g)| gaussians.transform_one(i, &refined.first[usize::from(*g)]));
         placed =
             Placed { tree: refined.tree, state_from_world: refined.state_from_world, nats: refined.cost, ..placed };
     }
-    gaussians.write_ply(&at.join("gaussians.ply"))?;
-    write_json(&at.join("placed.json"), &placed)?;
-    write_json(&at.join("extent.json"), &extent)
+    Ok(Splats { gaussians, extent, placed: Some(placed) })
 }
 
 /// Most views that are fitted: more of them say little that is new, and each costs memory.
 const MOST_VIEWS: usize = 240;
 
 /// Training frames spread over states and cameras.
-fn spread(context: &Context) -> Vec<usize> {
-    let recording = context.recording;
+fn spread(inputs: &Inputs) -> Vec<usize> {
+    let recording = inputs.recording;
     let n = recording.n_states;
-    let per_state: Vec<Vec<usize>> = (0..n).map(|s| recording.frames_of(s, Split::Train)).collect();
+    let per_state = inputs.training_frames();
     // The first state is the one the gaussians stand in; it gets a third.
     let rest = (MOST_VIEWS * 2 / 3).div_ceil(n - 1).max(2);
     let mut out = Vec::new();
@@ -115,21 +82,21 @@ fn spread(context: &Context) -> Vec<usize> {
 
 /// Surface of all views with parts, where the first state has it.
 fn canonical_samples(
-    context: &Context,
-    run: &Path,
+    inputs: &Inputs,
+    labelled: &[Labelled],
     targets: &[Arc<Target>],
     state_of: &(dyn Fn(usize) -> usize + Sync),
     poses: &[Vec<Pose>],
     diagonal: f64,
 ) -> Result<Vec<SurfaceSample>> {
-    let by_state = labelled::surfaces(run, poses.len(), &[])?;
+    let by_state = surfaces(labelled, poses.len(), &[]);
     // Farther from every sample is stray depth.
     let reach = (0.04 * diagonal as f32).powi(2);
     let each = targets.par_iter().enumerate().map(|(v, target)| {
         let state = state_of(v);
         let surface = &by_state[state];
         let back: Vec<Pose> = poses[state].iter().map(Pose::inverse).collect();
-        let mut own = surface_samples(target, targets.len(), context.config.seed ^ v as u64);
+        let mut own = surface_samples(target, targets.len(), inputs.config.seed ^ v as u64);
         own.retain_mut(|s| {
             let Some(part) = surface.part_at(s.position, Some(s.normal), reach) else { return false };
             s.group = u16::from(part);

@@ -1,7 +1,7 @@
 //! A person's corrections: `[[joint]]` entries of the config overrule what was found; only the stages from `joints` on
 //! run again.
 
-use super::joints::JointsFile;
+use crate::artifacts::Joints;
 use crate::failure::{Failure, Result};
 use glam::DVec3;
 use hingecast_geom::JointKind;
@@ -36,14 +36,14 @@ pub struct JointOverride {
 ///
 /// # Errors
 /// Joints or parts that are not there, axes of no length, limits upside down, a tree that hangs on itself.
-pub fn apply(file: &mut JointsFile, entries: &[JointOverride]) -> Result<()> {
+pub fn apply(file: &mut Joints, entries: &[JointOverride]) -> Result<()> {
     for (k, entry) in entries.iter().enumerate() {
         one(file, entry).map_err(|(what, hint)| Failure::new(what, format!("[[joint]] number {}", k + 1), hint))?;
     }
     file.tree.validate().map_err(|e| Failure::new(e, "[[joint]]", "change 'parent'"))
 }
 
-fn one(file: &mut JointsFile, entry: &JointOverride) -> std::result::Result<(), (String, String)> {
+fn one(file: &mut Joints, entry: &JointOverride) -> std::result::Result<(), (String, String)> {
     let names: Vec<&str> = file.tree.joints.iter().map(|j| j.name.as_str()).collect();
     let there = format!("joint = one of: {}", names.join(", "));
     let Some(j) = names.iter().position(|n| *n == entry.joint) else {
@@ -58,8 +58,9 @@ fn one(file: &mut JointsFile, entry: &JointOverride) -> std::result::Result<(), 
         };
     let joint = &mut file.tree.joints[j];
     // What was in doubt about it a person has now decided.
-    let mark = format!("'{}'", joint.name);
-    file.doubts.retain(|d| !(d.contains(&mark) && (entry.kind.is_some() || entry.axis.is_some())));
+    if entry.kind.is_some() || entry.axis.is_some() {
+        file.doubts.retain(|d| d.about() != Some(&joint.name));
+    }
     if entry.kind.is_some() || entry.axis.is_some() || entry.pivot.is_some() {
         file.certainty[j] = None;
     }
@@ -105,6 +106,7 @@ fn one(file: &mut JointsFile, entry: &JointOverride) -> std::result::Result<(), 
         joint.limits = [lo * unit, hi * unit];
     }
     if let Some(name) = &entry.name {
+        file.doubts = std::mem::take(&mut file.doubts).into_iter().map(|d| d.renamed(&joint.name, name)).collect();
         joint.name.clone_from(name);
     }
     Ok(())
