@@ -1,7 +1,7 @@
 //! One object of an experiment: each step done, or found done.
 
 use super::plan::Plan;
-use crate::verbs::{Session, bench};
+use crate::verbs::{Session, suite};
 use hingecast::config::Method;
 use hingecast::experiment::steps::Steps;
 use hingecast::experiment::{Demonstrated, Row, TwinError, World};
@@ -169,7 +169,7 @@ impl Cast<'_> {
         let path = self.root.join("recording");
         let (session, argument, config) = (self.session, self.argument, &self.plan.synth);
         self.steps.step("record", "record", &[&argument, config], &path.join("transforms.json"), || {
-            bench::record_once(session, argument, config, &path)
+            suite::record_once(session, argument, config, &path)
         })?;
         Ok(Some(path))
     }

@@ -3,7 +3,7 @@
 mod cast;
 mod plan;
 
-use super::bench::{self, Named};
+use super::suite::{Named, objects};
 use super::{Outcome, Session};
 use crate::cli;
 use cast::Cast;
@@ -17,7 +17,7 @@ use std::path::Path;
 
 pub fn run(session: &Session, args: &cli::Experiment) -> Result<Outcome> {
     let plan = Plan::new(args)?;
-    let objects = bench::objects(&args.objects)?;
+    let objects = objects(&args.objects)?;
     Experiment::may_become(&args.out)?;
     std::fs::create_dir_all(&args.out).map_err(Failure::io(&args.out))?;
     let mut experiment = Experiment { settings: plan.settings(), demonstrated: Vec::new(), rows: Vec::new() };
