@@ -5,16 +5,11 @@ pub mod build;
 pub mod chart;
 pub mod config;
 pub mod eval;
-#[cfg(feature = "mujoco")]
-pub mod experiment;
 pub mod failure;
 pub mod import_object;
+pub mod memory;
 pub mod overrides;
 pub mod report;
-#[cfg(feature = "mujoco")]
-pub mod simulate;
 pub mod stage;
 pub mod stages;
-pub mod training;
-pub mod ui;
 pub mod watcher;

@@ -114,7 +114,7 @@ impl RunFolder {
             name: stage.to_string(),
             stamp: stamp.to_string(),
             secs,
-            peak_memory: crate::ui::peak_memory(),
+            peak_memory: crate::memory::peak_memory(),
         });
         self.save()
     }

@@ -17,7 +17,7 @@ img{max-width:100%;display:block;margin:.3rem 0}figure{margin:0 0 1rem}figcaptio
 code{background:#f4f4f4;padding:0 .25em}";
 
 /// The page up to its heading.
-pub(crate) fn head(title: &str) -> String {
+pub fn head(title: &str) -> String {
     format!(
         "<!doctype html><html lang=\"en\"><meta charset=\"utf-8\"><title>{0}</title><style>{STYLE}</style><h1>{0}</h1>",
         escape(title)
@@ -50,7 +50,7 @@ pub(crate) fn page(run: &RunFolder, content: &Content) -> String {
     out + "</html>\n"
 }
 
-pub(crate) fn doubts(out: &mut String, doubts: &[String]) {
+pub fn doubts(out: &mut String, doubts: &[String]) {
     if doubts.is_empty() {
         let _ = write!(out, "<div class=\"fine\">No doubts were found. That is not proof: look at the pictures.</div>");
         return;
@@ -159,6 +159,6 @@ fn time(out: &mut String, run: &RunFolder) {
     );
 }
 
-pub(crate) fn escape(text: &str) -> String {
+pub fn escape(text: &str) -> String {
     text.replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;").replace('"', "&quot;")
 }

@@ -1,12 +1,8 @@
 //! `report/index.html`: doubts first, then pictures, joints, time. One folder, no network.
 
 pub mod draw;
-mod html;
+pub mod html;
 mod plot;
-#[cfg(feature = "mujoco")]
-pub mod rollout;
-#[cfg(feature = "mujoco")]
-mod rollout_plot;
 
 use crate::artifacts::{Joints, Splats, TwinFile};
 use crate::failure::{Failure, Result};

@@ -1,0 +1,425 @@
+//! The flags. Units and defaults are in the help texts.
+
+use clap::builder::{PossibleValuesParser, TypedValueParser};
+use clap::{Args, Parser, Subcommand};
+use hingecast::config::{Method, Preset};
+use hingecast::import_object::ImportConfig;
+use std::path::PathBuf;
+
+/// What a newcomer types first.
+const EXAMPLES: &str = "\
+First steps:
+  hingecast demo                                   the whole path on a sample object, in a few minutes
+  hingecast synth microwave -o rec                 record an object of objects/ (truth goes to rec.truth)
+  hingecast check rec                              is the recording in order?
+  hingecast build rec -o run                       recording -> run/twin (URDF, MJCF, meshes, gaussians)
+  hingecast eval run --truth rec.truth             how far off is it?
+
+Exit status: 0 done, 1 under a bar that you asked for, 2 error, 130 stopped by Ctrl-C.";
+
+fn at_least_one(text: &str) -> Result<usize, String> {
+    text.parse().ok().filter(|n| *n >= 1).ok_or_else(|| "a whole number from 1 is expected".to_string())
+}
+
+/// One of some words, as config files have them.
+fn words<T>(all: &'static [&'static str]) -> impl TypedValueParser<Value = T>
+where
+    T: serde::de::DeserializeOwned + Clone + Send + Sync + 'static,
+{
+    PossibleValuesParser::new(all).map(|word| serde_json::from_value(word.into()).expect("a word of the list"))
+}
+
+/// A cast of a thing, with its hinges: RGB-D recordings of an articulated object become a twin that MuJoCo runs.
+#[derive(Parser, Debug)]
+#[command(version, max_term_width = 110, after_help = EXAMPLES)]
+pub struct Cli {
+    #[command(subcommand)]
+    pub verb: Verb,
+    /// Machine-readable answer on stdout; everything human stays on stderr.
+    #[arg(long, global = true)]
+    pub json: bool,
+    /// Nothing on stderr but errors, not even the answer: that comes with --json.
+    #[arg(long, short, global = true)]
+    pub quiet: bool,
+    /// Worker threads, 1 or more [default: all cores]. The results do not depend on it.
+    #[arg(long, global = true, value_name = "N", value_parser = at_least_one)]
+    pub threads: Option<usize>,
+}
+
+#[derive(Subcommand, Debug)]
+pub enum Verb {
+    /// Record a sample object, build its twin, write the report: the whole path in a few minutes.
+    Demo(Demo),
+    /// Render a recording of an articulated object (URDF, MJCF, PartNet-Mobility) together with its truth.
+    Synth(Synth),
+    /// Convert a recording of another layout (nerfstudio, ArtGS, DTA, PARIS, ScrewSplat, Dynamic 3D Gaussians).
+    Import(Import),
+    /// Convert an object (PartNet-Mobility, URDF) for the simulator: convex collision pieces, joints, limits, masses.
+    ImportObject(ImportObject),
+    /// Say what is wrong with a recording and what to try; `--fix` repairs what is safe to repair.
+    Check(Check),
+    /// Build the twin of a recording. Run again to resume; finished stages are kept.
+    Build(Build),
+    /// Compare a run with the truth of its recording.
+    Eval(Eval),
+    /// Write the report of a run again.
+    Report(Report),
+    /// Record demonstrations of the robot arm opening an object or its twin; `--inspect` lists, plots and replays them.
+    Demos(Demos),
+    /// Clone a policy from demonstrations (robomimic HDF5). Run again to resume; `--sweep` tries many settings.
+    Train(Train),
+    /// Run a policy in seeded episodes on the true object, on its twin and on spoiled ones; compare in pairs.
+    Rollout(Rollout),
+    /// Ask what a twin is worth: policies trained on the object act on its twins and on spoiled ones, and back; one table, one plot.
+    Experiment(Experiment),
+    /// Record, build and evaluate a suite of objects; print the table of errors and times.
+    Bench(Bench),
+    /// Say what this machine has and lacks.
+    Doctor,
+}
+
+#[derive(Args, Debug)]
+pub struct Demo {
+    /// Sample object to record.
+    #[arg(default_value = "hinged_box")]
+    pub object: String,
+    /// Folder for recording and run [default: runs/demo/OBJECT].
+    #[arg(long, short)]
+    pub out: Option<PathBuf>,
+}
+
+#[derive(Args, Debug)]
+pub struct Synth {
+    /// Folder or file of the object, or the name of a sample (see objects/) or of one in $HINGECAST_DATA.
+    pub object: String,
+    /// Recording folder to write; the truth goes to <OUT>.truth.
+    #[arg(long, short)]
+    pub out: PathBuf,
+    #[command(flatten)]
+    pub settings: SynthSettings,
+    /// Seed of cameras, play and noise.
+    #[arg(long, default_value_t = 0, value_name = "N")]
+    pub seed: u64,
+    /// Leave the truth folder out.
+    #[arg(long)]
+    pub no_truth: bool,
+}
+
+#[derive(Args, Debug, Clone)]
+pub struct SynthSettings {
+    /// Joint configurations; 2 = both ends.
+    #[arg(long, default_value_t = 25, value_name = "N")]
+    pub states: usize,
+    /// Training cameras per state.
+    #[arg(long, default_value_t = 60, value_name = "N")]
+    pub views: usize,
+    /// Held-out cameras per state.
+    #[arg(long, default_value_t = 4, value_name = "N")]
+    pub test_views: usize,
+    /// Image width and height, pixels.
+    #[arg(long, default_value_t = 256, value_name = "PIXELS")]
+    pub size: usize,
+    /// Sensor model: `none` is exact; `d435` has depth noise, holes, colour noise, ragged masks and poses off by 0.5 deg and 3 mm.
+    #[arg(long, default_value = "none", value_parser = ["none", "d435"])]
+    pub noise: String,
+    /// A hand and forearm reach in on this share of the training frames [default without a value: 0.2].
+    #[arg(long, value_name = "SHARE", num_args = 0..=1, default_missing_value = "0.2")]
+    pub occluders: Option<f64>,
+    /// A recording of play: in every training frame hands hold the parts that move, and move along, as cameras see a person who
+    /// plays with the object; their pixels are masked, frames that show little else are marked.
+    #[arg(long, conflicts_with = "occluders")]
+    pub play: bool,
+    /// First and last value of a joint, radians (hinge) or scene units (slide); may be repeated [default: what it can do].
+    #[arg(long = "range", value_name = "JOINT=FROM:TO")]
+    pub ranges: Vec<String>,
+}
+
+#[derive(Args, Debug)]
+pub struct Import {
+    /// Folder of the recording to convert.
+    pub source: PathBuf,
+    /// Recording folder to write.
+    #[arg(long, short)]
+    pub out: PathBuf,
+    /// Layout of the source: auto, nerfstudio, artgs, dta, paris, screwsplat or dynamic3dgs.
+    #[arg(long, default_value = "auto")]
+    pub format: String,
+}
+
+#[derive(Args, Debug)]
+pub struct ImportObject {
+    /// Folder or file of the object (mobility.urdf), or the name of a sample or of one in $HINGECAST_DATA.
+    pub object: String,
+    /// Object folder to write: robot.xml (MJCF), robot.urdf, meshes.
+    #[arg(long, short)]
+    pub out: PathBuf,
+    /// All lengths times this. The simulator scales by itself what its arm cannot reach; leave it when twins of the same
+    /// recordings shall fit.
+    #[arg(long, default_value_t = ImportConfig::default().scale, value_name = "FACTOR")]
+    pub scale: f64,
+    /// Density of all parts, kg/m^3.
+    #[arg(long, default_value_t = ImportConfig::default().density, value_name = "DENSITY")]
+    pub density: f64,
+}
+
+#[derive(Args, Debug)]
+pub struct Check {
+    /// Recording folder (the one that holds transforms.json).
+    pub recording: PathBuf,
+    /// Repair what is safe: the old transforms.json is kept beside the new one.
+    #[arg(long)]
+    pub fix: bool,
+}
+
+#[derive(Args, Debug)]
+pub struct Build {
+    /// Recording folder (the one that holds transforms.json).
+    pub recording: PathBuf,
+    /// Run folder [default: runs/<recording's name>].
+    #[arg(long, short)]
+    pub out: Option<PathBuf>,
+    #[command(flatten)]
+    pub settings: BuildSettings,
+    /// First stage to redo even if it is done: parts, splat, joints or twin (method track: splat, motion, parts,
+    /// joints, twin) [default: the first that is missing].
+    #[arg(long, value_name = "STAGE")]
+    pub from: Option<String>,
+    /// Last stage to run [default: twin].
+    #[arg(long, value_name = "STAGE")]
+    pub to: Option<String>,
+    /// Throw an existing run away first.
+    #[arg(long)]
+    pub fresh: bool,
+    /// Exit with 1 when the run has doubts.
+    #[arg(long)]
+    pub strict: bool,
+}
+
+#[derive(Args, Debug, Clone)]
+pub struct BuildSettings {
+    /// fast: 12 k gaussians, 1500 steps; default: 24 k, 4000; best: 40 k, 10 000 and finer meshes.
+    #[arg(long, value_parser = words::<Preset>(&["fast", "default", "best"]), default_value = "default", hide_possible_values = true)]
+    pub preset: Preset,
+    /// How parts and joints are found; screw: by the depth of all states at once; track: the classical way, Dynamic 3D
+    /// Gaussians' tracking, distance clustering, ICP, RANSAC axis [default: screw].
+    #[arg(long, value_parser = words::<Method>(&["screw", "track"]), hide_possible_values = true)]
+    pub method: Option<Method>,
+    /// TOML file with settings; its keys beat the preset. A run's own config.toml shows all keys with units.
+    #[arg(long, value_name = "FILE")]
+    pub config: Option<PathBuf>,
+    /// One setting, for instance `fit.steps=2000` or `twin.density=800` (kg/m^3); beats the file. May be repeated.
+    #[arg(long = "set", value_name = "KEY=VALUE")]
+    pub set: Vec<String>,
+    /// Seed of everything random in the build [default: 0].
+    #[arg(long, value_name = "N")]
+    pub seed: Option<u64>,
+}
+
+#[derive(Args, Debug)]
+pub struct Eval {
+    /// Run folder, the -o of `hingecast build`.
+    pub run: PathBuf,
+    /// Truth folder of the run's recording: <RECORDING>.truth, as `hingecast synth` writes it.
+    #[arg(long)]
+    pub truth: PathBuf,
+    /// Exit with 1 unless the twin keeps this bar. KEY: joint.axis_deg (at most, degrees), joint.pivot (at most, share of the
+    /// diagonal: 0.01 = 1 %), psnr (at least, dB), parts (1 = the count must be right). May be repeated [default: no bar].
+    #[arg(long = "fail-under", value_name = "KEY=VALUE")]
+    pub bars: Vec<String>,
+}
+
+#[derive(Args, Debug)]
+pub struct Report {
+    /// Run folder, the -o of `hingecast build`.
+    pub run: PathBuf,
+}
+
+#[derive(Args, Debug)]
+pub struct Train {
+    /// Demonstrations in robomimic's HDF5 layout.
+    pub demos: PathBuf,
+    /// Policy folder to write: weights (safetensors), policy.json, losses, train.toml with all settings.
+    #[arg(long, short)]
+    pub out: PathBuf,
+    /// bc-rnn-fast: LSTM of 100, 6000 steps, minutes on two cores; bc-rnn: robomimic's settings for Lift, LSTM of 400,
+    /// 200 000 steps, hours; bc: an MLP that sees one step.
+    #[arg(long, default_value = "bc-rnn-fast", value_parser = ["bc-rnn-fast", "bc-rnn", "bc"], hide_possible_values = true)]
+    pub preset: String,
+    /// TOML file with settings; its keys beat the preset. A policy's own train.toml shows all keys with their values.
+    #[arg(long, value_name = "FILE")]
+    pub config: Option<PathBuf>,
+    /// One setting, for instance `learning_rate=3e-4` or `net.rnn_hidden=200`; beats the file. May be repeated.
+    #[arg(long = "set", value_name = "KEY=VALUE")]
+    pub set: Vec<String>,
+    /// Training steps, one batch each [default: of the preset].
+    #[arg(long, value_name = "N")]
+    pub steps: Option<usize>,
+    /// Seed of initial weights, batches and split [default: 0].
+    #[arg(long, value_name = "N")]
+    pub seed: Option<u64>,
+    /// Train once per combination of the settings in this TOML file, each in a folder of its own below OUT; as many at a time as
+    /// there are threads; table and plot at the end. docs/policy.md shows such a file.
+    #[arg(long, value_name = "FILE")]
+    pub sweep: Option<PathBuf>,
+    /// Episodes that every policy of a sweep is rolled out in, where the demonstrations' world is at hand; 0 = none.
+    #[arg(long, default_value_t = 50, value_name = "N")]
+    pub rollouts: usize,
+}
+
+#[derive(Args, Debug)]
+pub struct Bench {
+    /// `ours` (objects/), `real` ($HINGECAST_DATA), `all`, or object names.
+    #[arg(default_value = "ours")]
+    pub suite: Vec<String>,
+    /// Folder for recordings and runs; existing ones are reused.
+    #[arg(long, short, default_value = "runs/bench")]
+    pub out: PathBuf,
+    #[command(flatten)]
+    pub synth: SynthSettings,
+    #[command(flatten)]
+    pub build: BuildSettings,
+    /// Compare with the table of an earlier bench (its bench.json); exit 1 when a figure got clearly worse.
+    #[arg(long, value_name = "FILE")]
+    pub against: Option<PathBuf>,
+    /// Seed of cameras, play and noise of the recordings.
+    #[arg(long, default_value_t = 0, value_name = "N")]
+    pub recording_seed: u64,
+    /// Only parts and joints, under protocols of 25, 5 and 2 states with and without noise; the
+    /// method is screw. Smaller pictures make it quicker.
+    #[arg(long)]
+    pub joints: bool,
+    /// For the bench of joints: 25x60, 25x60-d435, 5x48, 5x48-d435, 2x100 or 2x100-d435 (states x views); may be repeated
+    /// [default: all].
+    #[arg(long = "protocol", value_name = "NAME")]
+    pub protocols: Vec<String>,
+    /// For the bench of joints: recordings of each object, with consecutive seeds.
+    #[arg(long, default_value_t = 1, value_name = "N")]
+    pub seeds: u64,
+    /// Delete each recording once it is evaluated (56 MB per object at the defaults).
+    #[arg(long)]
+    pub tidy: bool,
+}
+
+#[derive(Args, Debug)]
+pub struct Demos {
+    /// open: through half of the joint's range; close; hinged-box: the seed's two blocks, which lifting solves too.
+    #[arg(long, default_value = "open", value_parser = ["open", "close", "hinged-box"])]
+    pub task: String,
+    /// Folder or file of the object, or the name of a sample [default: covered_box; hinged_blocks for hinged-box].
+    #[arg(long, value_name = "OBJECT")]
+    pub object: Option<String>,
+    /// Record on the twin of this run instead [default: on the object].
+    #[arg(long, value_name = "RUN", conflicts_with = "object")]
+    pub twin: Option<PathBuf>,
+    /// Which joint moves, by its name in the model [default: the one that is easiest to grasp].
+    #[arg(long, value_name = "NAME")]
+    pub joint: Option<String>,
+    /// Simulated metres per unit of the model file [default: at most 1, so that the arm reaches all of the joint's way].
+    #[arg(long, value_name = "FACTOR")]
+    pub scale: Option<f64>,
+    /// Who demonstrates; teleop: you, at the keyboard of this terminal, 20 Hz. Each episode is in the file once it is kept; the
+    /// same command goes on with the file.
+    #[arg(long, default_value = "scripted", value_parser = ["scripted", "teleop"])]
+    pub expert: String,
+    /// Successful episodes to record (teleop: episodes to keep, unless you quit before).
+    #[arg(short, default_value_t = 300, value_name = "N", value_parser = at_least_one)]
+    pub n: usize,
+    /// File to write, robomimic's HDF5; needed unless --inspect is given [default: none].
+    #[arg(long, short, value_name = "FILE")]
+    pub out: Option<PathBuf>,
+    /// Seed of places, starts and imperfections.
+    #[arg(long, default_value_t = 0, value_name = "N")]
+    pub seed: u64,
+    /// List and plot this file and replay it; exit 1 unless every state comes out with the same bits [default: none].
+    #[arg(long, value_name = "FILE")]
+    pub inspect: Option<PathBuf>,
+}
+
+#[derive(Args, Debug)]
+pub struct Rollout {
+    /// Folder of the policy, the -o of `hingecast train`.
+    pub policy: PathBuf,
+    /// The true object: folder, file or name of a sample [default: what the demonstrations were recorded on].
+    #[arg(long, value_name = "OBJECT")]
+    pub object: Option<String>,
+    /// Run whose twin takes the object's place; both given: same seeds, compared in pairs [default: none].
+    #[arg(long, value_name = "RUN")]
+    pub twin: Option<PathBuf>,
+    /// Also on the object spoiled on purpose: axis=DEGREES, pivot=MM, limits=SHARE, edge (the hinge on the opposite edge);
+    /// joined by commas for several at once; may be repeated, each is a world of its own [default: none].
+    #[arg(long, value_name = "HOW")]
+    pub spoil: Vec<String>,
+    /// Demonstrations whose task (place, grasp, size) holds here [default: those that the policy was trained on; without
+    /// a note of them the task is made from the object].
+    #[arg(long, value_name = "FILE")]
+    pub demos: Option<PathBuf>,
+    /// Episodes in every world.
+    #[arg(short, default_value_t = 200, value_name = "N", value_parser = at_least_one)]
+    pub n: usize,
+    /// Seed of the episodes; that of the demonstrations (0) would begin where they began.
+    #[arg(long, default_value_t = 1, value_name = "N")]
+    pub seed: u64,
+    /// Folder for the report: index.html, rollout.json, a strip of pictures of each kind of end [default: none, only the answer].
+    #[arg(long, short, value_name = "FOLDER")]
+    pub out: Option<PathBuf>,
+}
+
+#[derive(Args, Debug)]
+pub struct Experiment {
+    /// Object names, `ours` (objects/), `real` ($HINGECAST_DATA) or `all`.
+    #[arg(default_values_t = ["covered_box", "microwave", "cabinet_two_door", "three_drawers"].map(String::from))]
+    pub objects: Vec<String>,
+    /// Folder to write: experiment.md, .csv, .json and .svg, and a folder of each object with all that was made on the way. Run
+    /// again to go on.
+    #[arg(long, short)]
+    pub out: PathBuf,
+    /// Recordings to take instead of rendering: <FOLDER>/<object>; what is not there is rendered [default: none].
+    #[arg(long, value_name = "FOLDER")]
+    pub recordings: Option<PathBuf>,
+    /// Runs of `hingecast build` to take instead of building: <FOLDER>/<object>, for the twin whose method they have; may be
+    /// repeated; what is not there is built [default: none].
+    #[arg(long, value_name = "FOLDER")]
+    pub runs: Vec<PathBuf>,
+    /// A world besides the true object: twin, track (the classical method's twin), axis=DEGREES, pivot=MM (simulated), limits=SHARE,
+    /// edge, or back (a policy from the twin on the true object); may be repeated [default: twin, track, axis=3, axis=10, axis=30,
+    /// pivot=3, pivot=10, pivot=30, limits=0.5, edge, back].
+    #[arg(long = "world", value_name = "NAME")]
+    pub worlds: Vec<String>,
+    /// Demonstrations on each object, and on each twin for `back`.
+    #[arg(short, long, default_value_t = 300, value_name = "N", value_parser = at_least_one)]
+    pub demos: usize,
+    /// Episodes of each policy on the true object, on twins and for `back`.
+    #[arg(short, long, default_value_t = 200, value_name = "N", value_parser = at_least_one)]
+    pub episodes: usize,
+    /// Episodes of each policy on each spoiled object, at most as many [default: as --episodes].
+    #[arg(long, value_name = "N", value_parser = at_least_one)]
+    pub spoiled_episodes: Option<usize>,
+    /// Policies trained on the same demonstrations, with seeds 0, 1, ...
+    #[arg(long, default_value_t = 3, value_name = "N", value_parser = at_least_one)]
+    pub train_seeds: usize,
+    /// Preset of the policies, as in `train`.
+    #[arg(long, default_value = "bc-rnn-fast", value_parser = ["bc-rnn-fast", "bc-rnn", "bc"])]
+    pub policy: String,
+    /// One setting of the training, for instance `steps=3000`; may be repeated [default: those of the preset].
+    #[arg(long = "policy-set", value_name = "KEY=VALUE")]
+    pub policy_set: Vec<String>,
+    #[command(flatten)]
+    pub synth: SynthSettings,
+    #[command(flatten)]
+    pub build: BuildSettings,
+    /// Seed of cameras, play and noise of the recordings.
+    #[arg(long, default_value_t = 0, value_name = "N")]
+    pub recording_seed: u64,
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use clap::CommandFactory;
+
+    /// clap's own check: doubled names, unreachable arguments. `bench` once had two `--seed`.
+    #[test]
+    fn the_flags_are_consistent() {
+        Cli::command().debug_assert();
+    }
+}

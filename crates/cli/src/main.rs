@@ -1,0 +1,50 @@
+//! The `hingecast` binary: flags and glue. Exit 0 done, 1 under the asked bar, 2 error, 130 stopped by Ctrl-C.
+
+mod cli;
+mod ui;
+mod verbs;
+
+use clap::Parser;
+use clap::error::{ContextKind, ErrorKind};
+use hingecast::failure::Failure;
+use std::io::Write;
+use std::process::ExitCode;
+
+fn main() -> ExitCode {
+    let cli = match cli::Cli::try_parse() {
+        Ok(cli) => cli,
+        Err(e) if matches!(e.kind(), ErrorKind::DisplayHelp | ErrorKind::DisplayVersion) => e.exit(),
+        Err(e) if e.kind() == ErrorKind::DisplayHelpOnMissingArgumentOrSubcommand => e.exit(),
+        Err(e) => return refuse(&misused(&e), std::env::args().any(|a| a == "--json")),
+    };
+    match verbs::run(&cli) {
+        Ok(verbs::Outcome::Done) => ExitCode::SUCCESS,
+        Ok(verbs::Outcome::UnderBar) => ExitCode::from(1),
+        Err(failure) => refuse(&failure, cli.json),
+    }
+}
+
+fn refuse(failure: &Failure, json: bool) -> ExitCode {
+    if json {
+        let error = serde_json::json!({"error": failure.what, "where": failure.place, "try": failure.hint});
+        println!("{error}");
+    }
+    // Nobody may be left to read it: a terminal that was closed.
+    let _ = writeln!(std::io::stderr(), "{}: {failure}", if failure.cancelled { "stopped" } else { "error" });
+    ExitCode::from(if failure.cancelled { 130 } else { 2 })
+}
+
+/// clap's complaint in our three lines.
+fn misused(e: &clap::Error) -> Failure {
+    let text = e.render().to_string();
+    let paragraph = text.split("\n\n").next().unwrap_or_default();
+    let lines: Vec<&str> = paragraph.lines().map(str::trim).collect();
+    let what = lines.join(" ").trim_start_matches("error: ").to_string();
+    let verb = std::env::args().nth(1).filter(|a| !a.starts_with('-')).unwrap_or_default();
+    let command = format!("hingecast {verb}").trim_end().to_string();
+    let near = [ContextKind::SuggestedArg, ContextKind::SuggestedSubcommand, ContextKind::SuggestedValue];
+    let near = near.iter().find_map(|kind| e.get(*kind)).map(|v| format!("{v}, or ")).unwrap_or_default();
+    // An unknown verb has no help of its own.
+    let help = if e.kind() == ErrorKind::InvalidSubcommand { "hingecast" } else { &command };
+    Failure::new(what, &command, format!("{near}{help} --help"))
+}

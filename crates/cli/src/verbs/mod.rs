@@ -1,0 +1,103 @@
+//! One file per verb; each answers an [`Outcome`].
+
+mod bench;
+mod build;
+mod check;
+mod demo;
+#[cfg(feature = "mujoco")]
+mod demos;
+mod doctor;
+mod eval;
+#[cfg(feature = "mujoco")]
+mod experiment;
+mod import;
+mod import_object;
+#[cfg(feature = "mujoco")]
+mod rollout;
+mod synth;
+mod table;
+mod train;
+
+use crate::cli::{Cli, Verb};
+use crate::ui::Ui;
+use hingecast::failure::Result;
+use hingecast::{report, stage::RunFolder};
+
+pub enum Outcome {
+    Done,
+    /// A bar that was asked for was missed.
+    UnderBar,
+}
+
+/// What every verb gets besides its own flags.
+pub struct Session {
+    pub ui: Ui,
+    pub json: bool,
+    pub threads: usize,
+}
+
+impl Session {
+    /// What studies run on.
+    pub fn host(&self) -> hingecast_study::host::Host<'_> {
+        hingecast_study::host::Host { watcher: &self.ui, threads: self.threads }
+    }
+
+    /// How builds run.
+    pub fn options(&self) -> hingecast::build::Options {
+        hingecast::build::Options { threads: self.threads, ..Default::default() }
+    }
+
+    /// The machine's answer, when it was asked for.
+    pub fn answer(&self, value: &impl serde::Serialize) {
+        if self.json {
+            println!("{}", serde_json::to_string(value).expect("plain data"));
+        }
+    }
+}
+
+pub fn run(cli: &Cli) -> Result<Outcome> {
+    let threads = cli.threads.unwrap_or_else(|| std::thread::available_parallelism().map_or(2, |n| n.get())).max(1);
+    // Fails only when a pool is there already: then that one serves.
+    let _ = rayon::ThreadPoolBuilder::new().num_threads(threads).build_global();
+    let session = Session { ui: Ui::new(cli.quiet), json: cli.json, threads };
+    match &cli.verb {
+        Verb::Demo(args) => demo::run(&session, args),
+        Verb::Synth(args) => synth::run(&session, args),
+        Verb::Import(args) => import::run(&session, args),
+        Verb::ImportObject(args) => import_object::run(&session, args),
+        Verb::Check(args) => check::run(&session, args),
+        Verb::Build(args) => build::run(&session, args),
+        Verb::Eval(args) => eval::run(&session, args),
+        Verb::Bench(args) => bench::run(&session, args),
+        Verb::Report(args) => {
+            let path = report::write(&RunFolder::open(&args.run)?)?;
+            session.ui.say(&format!("report: {}", path.display()));
+            session.answer(&serde_json::json!({ "report": path }));
+            Ok(Outcome::Done)
+        }
+        #[cfg(feature = "mujoco")]
+        Verb::Demos(args) => demos::run(&session, args),
+        #[cfg(not(feature = "mujoco"))]
+        Verb::Demos(_) => Err(without_mujoco("demos")),
+        #[cfg(feature = "mujoco")]
+        Verb::Rollout(args) => rollout::run(&session, args),
+        #[cfg(not(feature = "mujoco"))]
+        Verb::Rollout(_) => Err(without_mujoco("rollout")),
+        #[cfg(feature = "mujoco")]
+        Verb::Experiment(args) => experiment::run(&session, args),
+        #[cfg(not(feature = "mujoco"))]
+        Verb::Experiment(_) => Err(without_mujoco("experiment")),
+        Verb::Train(args) => train::run(&session, args),
+        Verb::Doctor => doctor::run(&session),
+    }
+}
+
+#[cfg(not(feature = "mujoco"))]
+fn without_mujoco(verb: &str) -> hingecast::failure::Failure {
+    let hint = "scripts/fetch_mujoco.sh, then build with default features";
+    hingecast::failure::Failure::new(
+        "this hingecast was built without the simulator",
+        format!("hingecast {verb}"),
+        hint,
+    )
+}

@@ -1,0 +1,26 @@
+//! What a study runs on, and whom it tells.
+
+use hingecast::build::Options;
+use hingecast::failure::Failure;
+use hingecast::watcher::Watcher;
+
+/// The machine's threads, and a listener.
+#[derive(Clone, Copy)]
+pub struct Host<'a> {
+    /// Hears of steps and stages, and may wish to stop.
+    pub watcher: &'a dyn Watcher,
+    /// Worker threads of builds.
+    pub threads: usize,
+}
+
+impl Host<'_> {
+    /// How builds run here.
+    pub fn options(&self) -> Options {
+        Options { threads: self.threads, ..Options::default() }
+    }
+
+    /// One broken object must not hide the others' figures: its error is told, and the study goes on.
+    pub fn tell_error(&self, failure: &Failure) {
+        self.watcher.say(&format!("error: {failure}"));
+    }
+}

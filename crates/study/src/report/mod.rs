@@ -1,0 +1,4 @@
+//! Pages about policies.
+
+pub mod rollout;
+mod rollout_plot;
