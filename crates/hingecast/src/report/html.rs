@@ -2,6 +2,7 @@
 
 use super::{Content, draw::PALETTE};
 use crate::stage::RunFolder;
+use hingecast_articulate::PassRecord;
 use hingecast_geom::{Certainty, JointKind};
 use std::fmt::Write as _;
 
@@ -46,6 +47,7 @@ pub(crate) fn page(run: &RunFolder, content: &Content) -> String {
             h.file, h.state, h.psnr
         );
     }
+    passes(&mut out, &content.trace);
     time(&mut out, run);
     out + "</html>\n"
 }
@@ -132,6 +134,41 @@ fn parts(out: &mut String, content: &Content) {
         );
     }
     let _ = write!(out, "</table>");
+}
+
+/// What the passes of the search did, those that changed nothing together in one line.
+fn passes(out: &mut String, trace: &[PassRecord]) {
+    if trace.is_empty() {
+        return;
+    }
+    let _ = write!(
+        out,
+        "<h2>How the joints were settled</h2><p>Passes in order, with how well the tree explains what moved (nats, higher is \
+         better; counted on a few hundred samples). <code>--set 'passes.skip=[\"name\"]'</code> leaves one out.</p>\
+         <table><tr><th>pass</th><th>round</th><th>parts</th><th>nats before</th><th>after</th><th>seconds</th></tr>"
+    );
+    let idle = |r: &&PassRecord| r.nats[0] == r.nats[1] && !r.skipped;
+    for r in trace.iter().filter(|r| !idle(r)) {
+        let _ = write!(
+            out,
+            "<tr><td>{}{}</td><td class=n>{}</td><td class=n>{}</td><td class=n>{:.0}</td><td class=n>{:.0}</td>\
+             <td class=n>{:.2}</td></tr>",
+            escape(&r.pass),
+            if r.skipped { " (skipped)" } else { "" },
+            r.round,
+            r.parts,
+            r.nats[0],
+            r.nats[1],
+            r.secs
+        );
+    }
+    let rest: Vec<&PassRecord> = trace.iter().filter(idle).collect();
+    let secs: f64 = rest.iter().map(|r| r.secs).sum();
+    let _ = write!(
+        out,
+        "<tr><td>{} others, which changed nothing</td><td></td><td></td><td></td><td></td><td class=n>{secs:.2}</td></tr></table>",
+        rest.len()
+    );
 }
 
 fn time(out: &mut String, run: &RunFolder) {

@@ -4,12 +4,13 @@ pub mod draw;
 pub mod html;
 mod plot;
 
-use crate::artifacts::{Joints, Splats, TwinFile};
+use crate::artifacts::{Joints, Parts, Splats, TwinFile};
 use crate::failure::{Failure, Result};
 use crate::stage::RunFolder;
 use crate::stages::labeller::Labeller;
 use crate::stages::targets;
 use glam::{DVec3, Vec3};
+use hingecast_articulate::PassRecord;
 use hingecast_capture::{Recording, Split, ViewCache};
 use hingecast_geom::KinematicTree;
 use hingecast_splat::metrics;
@@ -29,6 +30,8 @@ pub(crate) struct Content {
     pub overlays: Vec<(String, String)>,
     pub held_out: Vec<HeldOut>,
     pub plot: String,
+    /// What the passes of the search did.
+    pub trace: Vec<PassRecord>,
 }
 
 /// Writes the report of a finished run; answers the path of `index.html`.
@@ -87,7 +90,7 @@ pub fn write(run: &RunFolder) -> Result<PathBuf> {
         }
     }
     let plot = plot::joint_values(&twin.tree, extent.diagonal);
-    let content = Content { twin, overlays, held_out, plot };
+    let content = Content { twin, overlays, held_out, plot, trace: Parts::read_trace(&run.root) };
     let path = folder.join("index.html");
     let text = html::page(run, &content);
     hingecast_geom::ply::write_whole(&path, text.as_bytes()).map_err(Failure::io(&path))?;
