@@ -6,6 +6,8 @@
 //! - metres (or scene units where a recording has no metric scale), radians, seconds, kilograms;
 //! - poses and joints are f64, gaussians and pixels f32; quaternions are written w x y z in files.
 
+#![warn(missing_docs)]
+
 pub mod camera;
 pub mod folder;
 pub mod gaussians;
