@@ -9,6 +9,8 @@
 //!
 //! Cameras are OpenCV (x right, y down, z forward), pixel centres at +0.5, depth is z, 0 = unknown.
 
+#![warn(missing_docs)]
+
 pub mod check;
 pub mod import;
 pub mod object;

@@ -41,6 +41,7 @@ pub enum Format {
 }
 
 impl Format {
+    /// Every format with its name on the command line.
     pub const ALL: [(&'static str, Format); 7] = [
         ("auto", Format::Auto),
         ("nerfstudio", Format::Nerfstudio),
@@ -51,6 +52,7 @@ impl Format {
         ("dynamic3dgs", Format::Dynamic3dgs),
     ];
 
+    /// Its name on the command line.
     pub fn name(self) -> &'static str {
         Self::ALL.iter().find(|(_, f)| *f == self).map_or("auto", |(name, _)| name)
     }
@@ -71,9 +73,13 @@ impl Format {
 /// What was imported.
 #[derive(Clone, Debug)]
 pub struct ImportReport {
+    /// Folder of the native recording.
     pub recording: PathBuf,
+    /// The layout that was read; never [`Format::Auto`].
     pub format: Format,
+    /// How many joint states it has.
     pub states: usize,
+    /// How many frames it has, over all states.
     pub frames: usize,
 }
 
