@@ -7,6 +7,8 @@
 //! ```
 //! Every part is fused in its own frame from all states: the inside of a drawer and the back of a door are there.
 
+#![warn(missing_docs)]
+
 pub mod build;
 pub mod clearance;
 mod color;
@@ -43,7 +45,9 @@ pub const UNKNOWN: u8 = 254;
 /// One depth image with a part id per pixel.
 #[derive(Clone)]
 pub struct Observation {
+    /// State of the recording, from 0.
     pub state: usize,
+    /// Where it was taken from; its size is (h, w).
     pub camera: Camera,
     /// z depth, scene units, 0 = unknown. (h, w)
     pub depth: Vec<f32>,
@@ -76,17 +80,24 @@ pub struct Inertial {
 /// One link of the twin; geometry in the canonical world frame (all joints at 0).
 #[derive(Clone, Debug)]
 pub struct PartModel {
+    /// Name of the link.
     pub name: String,
+    /// The surface as it is shown, with vertex colours; empty for a part that no view shows.
     pub mesh: TriMesh,
+    /// Convex pieces for collision.
     pub hulls: Vec<TriMesh>,
+    /// Mass, centre of mass and inertia of the solid.
     pub inertial: Inertial,
 }
 
 /// Everything that `write` needs.
 #[derive(Clone, Debug)]
 pub struct Twin {
+    /// Name of the object.
     pub name: String,
+    /// Parts and joints; the screws stand in the canonical world frame.
     pub tree: KinematicTree,
+    /// One link a part; index = part id.
     pub parts: Vec<PartModel>,
     /// What a person should know before trusting this twin; the first is the gravest.
     pub doubts: Vec<String>,
@@ -94,6 +105,8 @@ pub struct Twin {
     pub certainty: Vec<Option<Certainty>>,
     /// Diagonal of the object's box in the first state, scene units.
     pub diagonal: f64,
+    /// Lengths are metres; otherwise scene units.
     pub metric: bool,
+    /// Unit vector that points up in the world.
     pub up: DVec3,
 }
