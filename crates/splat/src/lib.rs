@@ -9,6 +9,8 @@
 //! are added to both screen variances. Results do not depend on the number of threads, bit for bit; between instruction
 //! sets they agree to about 1e-5.
 
+#![warn(missing_docs)]
+
 mod adam;
 mod bins;
 pub mod checkpoint;
