@@ -14,7 +14,7 @@ pub struct TriMesh {
     pub colors: Vec<[u8; 3]>,
 }
 
-/// Volume [m^3], centroid [m] and second moments about the centroid [m^5] of a closed mesh.
+/// Volume (m^3), centroid (m) and second moments about the centroid (m^5) of a closed mesh.
 #[derive(Clone, Copy, Debug)]
 pub struct MassIntegrals {
     /// Enclosed volume; negative when the faces are oriented inwards.

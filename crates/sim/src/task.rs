@@ -63,7 +63,7 @@ pub struct TaskSpec {
     pub scale: f64,
     /// Nominal `world_from_base`; lengths are simulated metres.
     pub place: Pose,
-    /// Half widths of the uniform draw of x [m], y [m], yaw [rad] about `place`.
+    /// Half widths of the uniform draw of x (m), y (m), yaw (rad) about `place`.
     pub spread: [f64; 3],
     /// Where the gripper holds the moving part when the joint is closed, base frame: z approaches, y closes.
     pub grasp: Pose,

@@ -6,7 +6,7 @@
 //! ```
 //! Names, order of parameters and initial values are those of robomimic 0.3 on PyTorch (`models/base_nets.py`,
 //! `models/policy_nets.py`), so that weights go from one to the other by name. Everything is row-major f32; a batch of B
-//! sequences of T steps is T x B rows, the rows of one time together. [`reference`] is the slow twin in f64.
+//! sequences of T steps is T x B rows, the rows of one time together. [`mod@reference`] is the slow twin in f64.
 
 mod adam;
 mod gemm;
