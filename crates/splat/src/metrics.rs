@@ -12,10 +12,10 @@ pub fn psnr(a: &[f32], b: &[f32]) -> f64 {
     -10.0 * (sum / a.len() as f64).max(1e-12).log10()
 }
 
+/// Mean structural similarity of two (h, w, 3) pictures: 11 x 11 window, sigma 1.5, zero outside, as in training.
 ///
 /// # Panics
 /// When a picture is not (height, width, 3).
-/// Mean structural similarity of two (h, w, 3) pictures: 11 x 11 window, sigma 1.5, zero outside, as in training.
 pub fn ssim(a: &[f32], b: &[f32], width: usize, height: usize) -> f64 {
     assert_eq!(a.len(), 3 * width * height, "a is (h, w, 3)");
     assert_eq!(b.len(), a.len(), "pictures of one size");
