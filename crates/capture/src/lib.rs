@@ -8,6 +8,23 @@
 //! - [`truth`] is what `synth` knows and `build` must not read: only evaluation and tests open it.
 //!
 //! Cameras are OpenCV (x right, y down, z forward), pixel centres at +0.5, depth is z, 0 = unknown.
+//!
+//! ```no_run
+//! use hingecast_capture::{CaptureError, Recording, Split};
+//! use std::path::Path;
+//!
+//! let recording = Recording::open(Path::new("recordings/cabinet"))?;
+//! for state in 0..recording.n_states {
+//!     for frame in recording.frames_of(state, Split::Train) {
+//!         let view = recording.load(frame)?;
+//!         let known = view.depth.iter().filter(|z| **z > 0.0).count();
+//!         println!("state {state}, frame {frame}: {known} pixels with depth");
+//!     }
+//! }
+//! # Ok::<(), CaptureError>(())
+//! ```
+
+#![warn(missing_docs)]
 
 pub mod check;
 pub mod import;

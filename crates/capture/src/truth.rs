@@ -13,6 +13,7 @@ pub struct Truth {
     /// Folder of the truth; not stored.
     #[serde(skip)]
     pub root: PathBuf,
+    /// Name of the object.
     pub object: String,
     /// World frame of the recording, canonical at q = 0; `values` per state, held-out states last;
     /// `limits` are the ranges that were played.

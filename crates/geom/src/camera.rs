@@ -8,12 +8,19 @@ use serde::{Deserialize, Serialize};
 /// `fx fy cx cy` in pixels; the centre of the top-left pixel is at (0.5, 0.5).
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Camera {
+    /// Columns of the picture, pixels.
     pub width: usize,
+    /// Rows of the picture, pixels.
     pub height: usize,
+    /// Horizontal focal length, pixels.
     pub fx: f64,
+    /// Vertical focal length, pixels.
     pub fy: f64,
+    /// Column of the principal point, pixels; `width / 2` when centred.
     pub cx: f64,
+    /// Row of the principal point, pixels; `height / 2` when centred.
     pub cy: f64,
+    /// Maps world points into the camera frame (x right, y down, z forward).
     pub camera_from_world: Pose,
 }
 
@@ -92,6 +99,7 @@ impl Projection {
         }
     }
 
+    /// The point in the camera frame, from one of the points' frame.
     pub fn to_camera(&self, x: Vec3) -> Vec3 {
         self.rot * x + self.trans
     }

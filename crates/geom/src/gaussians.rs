@@ -26,15 +26,20 @@ pub struct Gaussians {
 }
 
 impl Gaussians {
+    /// How many gaussians there are.
     pub fn len(&self) -> usize {
         self.means.len()
     }
 
+    /// True without gaussians.
     pub fn is_empty(&self) -> bool {
         self.means.is_empty()
     }
 
     /// The gaussians at `indices`, in that order.
+    ///
+    /// # Panics
+    /// When an index is not below [`Gaussians::len`].
     pub fn select(&self, indices: &[usize]) -> Self {
         fn pick<T: Copy>(from: &[T], indices: &[usize]) -> Vec<T> {
             indices.iter().map(|&i| from[i]).collect()
@@ -65,6 +70,9 @@ impl Gaussians {
 
     /// Writes the INRIA layout: x y z nx ny nz f_dc_* f_rest_* opacity scale_* rot_*.
     /// `f_rest` is channel-major (all of red first), as the reference implementation stores it.
+    ///
+    /// # Errors
+    /// The file cannot be written.
     pub fn write_ply(&self, path: &Path) -> Result<(), PlyError> {
         let rest = if self.sh1.is_empty() { 0 } else { 9 };
         let mut names: Vec<String> =
@@ -90,6 +98,9 @@ impl Gaussians {
     }
 
     /// Reads the INRIA layout; harmonics above degree 1 are dropped.
+    ///
+    /// # Errors
+    /// The file cannot be read, is no PLY, or lacks a property of the layout.
     pub fn read_ply(path: &Path) -> Result<Self, PlyError> {
         let table = ply::read_vertices(path)?;
         let column = |name: &str| table.column(path, name);

@@ -9,12 +9,15 @@ use rayon::prelude::*;
 
 /// A measured surface: points with normals, world frame, and a tree over them.
 pub struct Surface {
+    /// Measured points, world frame, scene units. (n, 3)
     pub points: Vec<Vec3>,
+    /// Their unit normals, towards the side that was seen. (n, 3)
     pub normals: Vec<Vec3>,
     tree: PointTree,
 }
 
 impl Surface {
+    /// Builds the tree over `points`; `normals` has the same length.
     pub fn new(points: Vec<Vec3>, normals: Vec<Vec3>) -> Self {
         let tree = PointTree::new(&points);
         Self { points, normals, tree }
@@ -42,12 +45,18 @@ pub struct IcpReport {
 
 /// Improves `start` (world at the target state from world at the source state) for `points` with `normals`.
 /// `gates`: largest accepted distance per round, scene units.
+///
+/// # Panics
+/// When `normals` is shorter than `points`, or the target has fewer normals than points.
 pub fn align(points: &[Vec3], normals: &[Vec3], target: &Surface, start: Pose, gates: &[f64]) -> (Pose, IcpReport) {
     align_tethered(points, normals, target, start, gates, 0.0)
 }
 
 /// As [`align`], with every point tied to where it was given by `tether` times the pull towards a plane: directions that
 /// the surface leaves open (a plane sliding in itself) stay as they were recorded.
+///
+/// # Panics
+/// As [`align`].
 pub fn align_tethered(
     points: &[Vec3],
     normals: &[Vec3],

@@ -24,10 +24,12 @@ impl InputError {
         Self { what: line(what.into()), place: line(place.into()), hint: line(hint.into()), cancelled: false }
     }
 
+    /// The file at `path` cannot be read, for the reason `error`.
     pub fn read(path: &Path, error: impl std::fmt::Display) -> Self {
         Self::new(format!("cannot read the file: {error}"), path.display().to_string(), "check the path and its rights")
     }
 
+    /// The file at `path` cannot be written, for the reason `error`.
     pub fn write(path: &Path, error: impl std::fmt::Display) -> Self {
         Self::new(
             format!("cannot write the file: {error}"),

@@ -6,21 +6,27 @@ use glam::{DMat3, DVec3, Vec3};
 /// Triangles, counter-clockwise seen from outside. `colors` is empty or one sRGB triple a vertex.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct TriMesh {
+    /// Corner positions, scene units. (n, 3)
     pub vertices: Vec<Vec3>,
+    /// Indices of three vertices a triangle. (m, 3)
     pub faces: Vec<[u32; 3]>,
+    /// sRGB of every vertex, or empty. (n, 3)
     pub colors: Vec<[u8; 3]>,
 }
 
-/// Volume [m^3], centroid [m] and second moments about the centroid [m^5] of a closed mesh.
+/// Volume (m^3), centroid (m) and second moments about the centroid (m^5) of a closed mesh.
 #[derive(Clone, Copy, Debug)]
 pub struct MassIntegrals {
+    /// Enclosed volume; negative when the faces are oriented inwards.
     pub volume: f64,
+    /// Centre of the volume, in the frame of the mesh.
     pub centroid: DVec3,
     /// Integral of (|r|^2 1 - r r') dV about the centroid: times density it is the inertia tensor.
     pub inertia_per_density: DMat3,
 }
 
 impl TriMesh {
+    /// True without faces, whatever the vertices.
     pub fn is_empty(&self) -> bool {
         self.faces.is_empty()
     }
@@ -29,12 +35,14 @@ impl TriMesh {
         self.faces[face].map(|i| self.vertices[i as usize].as_dvec3())
     }
 
+    /// Moves every vertex from frame `b` to frame `a`; `pose` is `a_from_b`.
     pub fn transform(&mut self, pose: &Pose) {
         for v in &mut self.vertices {
             *v = pose.apply(v.as_dvec3()).as_vec3();
         }
     }
 
+    /// A copy moved by `pose`, as [`TriMesh::transform`] does.
     pub fn transformed(&self, pose: &Pose) -> Self {
         let mut out = self.clone();
         out.transform(pose);
@@ -60,6 +68,7 @@ impl TriMesh {
         Some(self.vertices.iter().fold((first, first), |(lo, hi), v| (lo.min(*v), hi.max(*v))))
     }
 
+    /// Sum of the areas of the faces, scene units squared.
     pub fn area(&self) -> f64 {
         (0..self.faces.len()).map(|f| self.face_area(f)).sum()
     }

@@ -8,6 +8,9 @@ use std::path::Path;
 
 impl TriMesh {
     /// Binary PLY with positions, optional uchar colours, triangles.
+    ///
+    /// # Errors
+    /// The file cannot be written.
     pub fn write_ply(&self, path: &Path) -> Result<(), PlyError> {
         let mut out = format!(
             "ply\nformat binary_little_endian 1.0\nelement vertex {}\nproperty float x\nproperty float y\nproperty float z\n",
@@ -36,6 +39,9 @@ impl TriMesh {
     }
 
     /// Reads positions, triangles, and colours named red green blue if there are any.
+    ///
+    /// # Errors
+    /// The file cannot be read, is no PLY, or has no properties x, y and z.
     pub fn read_ply(path: &Path) -> Result<Self, PlyError> {
         let table = ply::read_vertices(path)?;
         let xyz = [table.column(path, "x")?, table.column(path, "y")?, table.column(path, "z")?];
@@ -52,6 +58,9 @@ impl TriMesh {
     }
 
     /// OBJ text with `v x y z r g b` lines (colours in [0, 1]) and triangles.
+    ///
+    /// # Errors
+    /// The file cannot be written.
     pub fn write_obj(&self, path: &Path) -> std::io::Result<()> {
         let mut out = String::new();
         for (i, v) in self.vertices.iter().enumerate() {
@@ -67,6 +76,9 @@ impl TriMesh {
     }
 
     /// Binary STL, which MuJoCo and every URDF loader reads.
+    ///
+    /// # Errors
+    /// The file cannot be written.
     pub fn write_stl(&self, path: &Path) -> std::io::Result<()> {
         let mut out = vec![0u8; 80];
         out.extend((self.faces.len() as u32).to_le_bytes());

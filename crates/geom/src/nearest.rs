@@ -11,6 +11,7 @@ pub struct PointTree {
 }
 
 impl PointTree {
+    /// Builds the tree; answers are indices into `points`.
     pub fn new(points: &[Vec3]) -> Self {
         let rows: Vec<[f32; 3]> = points.iter().map(|p| p.to_array()).collect();
         Self { tree: ImmutableKdTree::new_from_slice(&rows).ok().filter(|_| !rows.is_empty()) }

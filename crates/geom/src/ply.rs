@@ -4,12 +4,25 @@
 use std::io::Write;
 use std::path::{Path, PathBuf};
 
+/// Why a PLY file could not be read or written.
 #[derive(Debug, thiserror::Error)]
 pub enum PlyError {
+    /// The operating system refused to read or write.
     #[error("cannot read or write {path}: {source}")]
-    Io { path: PathBuf, source: std::io::Error },
+    Io {
+        /// The file.
+        path: PathBuf,
+        /// What the system said.
+        source: std::io::Error,
+    },
+    /// The file is there, but not what was looked for.
     #[error("{path} is not a usable PLY: {what}")]
-    Format { path: PathBuf, what: String },
+    Format {
+        /// The file.
+        path: PathBuf,
+        /// What is wrong with it.
+        what: String,
+    },
 }
 
 fn io_error(path: &Path) -> impl FnOnce(std::io::Error) -> PlyError {
@@ -24,17 +37,24 @@ fn bad(path: &Path, what: impl Into<String>) -> PlyError {
 /// The scalar vertex properties as f32, row-major (rows, names.len()), and triangle indices if there are faces.
 #[derive(Debug, Default)]
 pub struct VertexTable {
+    /// Names of the properties, in file order: the columns of `data`.
     pub names: Vec<String>,
+    /// Row-major values, one row a vertex. (rows, names.len())
     pub data: Vec<f32>,
+    /// Triangles, as indices of rows; polygons arrive as fans.
     pub faces: Vec<[u32; 3]>,
 }
 
 impl VertexTable {
+    /// How many vertices there are.
     pub fn rows(&self) -> usize {
         if self.names.is_empty() { 0 } else { self.data.len() / self.names.len() }
     }
 
     /// Index of a property; the error names the file and what it has instead.
+    ///
+    /// # Errors
+    /// No property has this name; `path` is only named in the message.
     pub fn column(&self, path: &Path, name: &str) -> Result<usize, PlyError> {
         self.names
             .iter()
@@ -222,6 +242,9 @@ pub fn read_vertices(path: &Path) -> Result<VertexTable, PlyError> {
 }
 
 /// Writes a binary PLY whose vertices have the float properties `names`; `data` is row-major.
+///
+/// # Errors
+/// The file cannot be written.
 pub fn write_float_vertices(path: &Path, names: &[String], data: &[f32]) -> Result<(), PlyError> {
     let rows = data.len() / names.len().max(1);
     let mut out = format!("ply\nformat binary_little_endian 1.0\nelement vertex {rows}\n").into_bytes();
@@ -236,6 +259,9 @@ pub fn write_float_vertices(path: &Path, names: &[String], data: &[f32]) -> Resu
 }
 
 /// Writes `bytes` under a temporary name and renames: a reader never sees half a file.
+///
+/// # Errors
+/// The temporary file cannot be written beside `path`, or not be renamed.
 pub fn write_whole(path: &Path, bytes: &[u8]) -> std::io::Result<()> {
     let mut name = path.file_name().unwrap_or_default().to_os_string();
     name.push(".tmp");

@@ -6,7 +6,9 @@ use serde::{Deserialize, Serialize};
 /// A rigid transform `a_from_b`: x_a = rot * x_b + trans. Translation in metres (scene units).
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Pose {
+    /// Rotation, unit length.
     pub rot: DQuat,
+    /// Translation, metres or scene units: where the origin of `b` lies in `a`.
     pub trans: DVec3,
 }
 
@@ -17,12 +19,15 @@ impl Default for Pose {
 }
 
 impl Pose {
+    /// Moves nothing.
     pub const IDENTITY: Self = Self { rot: DQuat::IDENTITY, trans: DVec3::ZERO };
 
+    /// From a unit quaternion and a translation.
     pub fn new(rot: DQuat, trans: DVec3) -> Self {
         Self { rot, trans }
     }
 
+    /// A translation without rotation.
     pub fn from_trans(trans: DVec3) -> Self {
         Self { rot: DQuat::IDENTITY, trans }
     }
@@ -37,14 +42,17 @@ impl Pose {
         Self::from_mat3_trans(DMat3::from_mat4(*m), m.w_axis.truncate())
     }
 
+    /// The 4x4 matrix of the same transform, for column vectors.
     pub fn to_mat4(self) -> DMat4 {
         DMat4::from_rotation_translation(self.rot, self.trans)
     }
 
+    /// The rotation as a matrix.
     pub fn mat3(&self) -> DMat3 {
         DMat3::from_quat(self.rot)
     }
 
+    /// `b_from_a` of an `a_from_b`.
     pub fn inverse(&self) -> Self {
         let rot = self.rot.conjugate();
         Self { rot, trans: -(rot * self.trans) }

@@ -8,9 +8,13 @@ use serde::{Deserialize, Serialize};
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum JointKind {
+    /// Does not move: the child is welded to its parent.
     Fixed,
+    /// Turns about the axis within limits; the value is in radians.
     Revolute,
+    /// Turns about the axis without limits; the value is in radians.
     Continuous,
+    /// Slides along the axis; the value is in metres or scene units.
     Prismatic,
 }
 
@@ -25,8 +29,12 @@ impl JointKind {
 /// `axis` is unit length; `pivot` is a point on the axis (ignored by prismatic joints).
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Screw {
+    /// How the child moves.
     pub kind: JointKind,
+    /// Direction of the axis, unit length; positive values turn right-handed about it or slide
+    /// along it.
     pub axis: DVec3,
+    /// A point on the axis, scene units.
     pub pivot: DVec3,
 }
 
@@ -62,8 +70,11 @@ impl Screw {
 /// The joint that carries part `child` on part `parent`.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Joint {
+    /// Name, as the simulator files have it.
     pub name: String,
+    /// Part id that carries.
     pub parent: usize,
+    /// Part id that is carried.
     pub child: usize,
     /// In the world frame, with every joint of the tree at 0 (the canonical configuration).
     pub screw: Screw,
@@ -76,6 +87,7 @@ pub struct Joint {
 /// How sure the depth makes one of a joint: standard deviations, and what else it might be.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Certainty {
+    /// Of the axis' direction, degrees.
     pub axis_deg: f64,
     /// Scene units; 0 for a slide.
     pub pivot: f64,
@@ -92,10 +104,12 @@ pub struct Certainty {
 pub struct KinematicTree {
     /// Part names; index = part id.
     pub parts: Vec<String>,
+    /// In any order; index = joint id.
     pub joints: Vec<Joint>,
 }
 
 impl KinematicTree {
+    /// The joint whose child is `part`; `None` for a root.
     pub fn joint_of(&self, part: usize) -> Option<&Joint> {
         self.joints.iter().find(|j| j.child == part)
     }
@@ -119,17 +133,27 @@ impl KinematicTree {
         self.ancestry(part).into_iter().fold(Pose::IDENTITY, carried)
     }
 
-    /// The joint values of recording state `state`.
+    /// The joint values of recording state `state`, one a joint.
+    ///
+    /// # Panics
+    /// When a joint has no value of that state.
     pub fn values_at(&self, state: usize) -> Vec<f64> {
         self.joints.iter().map(|j| j.values[state]).collect()
     }
 
     /// `world_from_canonical` of every part in recording state `state`.
+    ///
+    /// # Panics
+    /// When a joint has no value of that state.
     pub fn poses_at(&self, state: usize) -> Vec<Pose> {
         self.poses(&self.values_at(state))
     }
 
     /// Checks the invariants; the message names the offending joint.
+    ///
+    /// # Errors
+    /// A joint names a part that is not there, a part is the child of two joints or hangs on itself,
+    /// an axis is not of unit length, or a number is not finite.
     pub fn validate(&self) -> Result<(), String> {
         let n = self.parts.len();
         let mut child_of = vec![None; n];

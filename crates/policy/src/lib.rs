@@ -3,6 +3,8 @@
 //! Knows no simulator: observations and actions are plain numbers. `docs/policy.md` has the formulas and says where this
 //! follows robomimic to the digit and where it does not.
 
+#![warn(missing_docs)]
+
 mod actor;
 pub mod demos;
 pub mod net;

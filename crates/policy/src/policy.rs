@@ -18,6 +18,7 @@ const FORMAT: &str = "hingecast-policy-1";
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct ObsKey {
+    /// Its name in the demonstrations and the environment.
     pub key: String,
     /// How many numbers.
     pub width: usize,
@@ -27,7 +28,9 @@ pub struct ObsKey {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Normalization {
+    /// Mean of every number. (inputs)
     pub mean: Vec<f64>,
+    /// What every number is divided by, above 0. (inputs)
     pub std: Vec<f64>,
 }
 
@@ -35,11 +38,13 @@ pub struct Normalization {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct PolicyConfig {
+    /// Name and version of the format.
     pub format: String,
     /// In alphabetical order, which is the order of their numbers in the network's input.
     pub obs: Vec<ObsKey>,
     /// Steps after which a rollout forgets the hidden state (robomimic's rnn.horizon).
     pub horizon: usize,
+    /// Shape of the network.
     pub net: NetConfig,
     /// `None`: observations go in as they are.
     pub normalization: Option<Normalization>,
@@ -48,6 +53,7 @@ pub struct PolicyConfig {
 }
 
 impl PolicyConfig {
+    /// A configuration in the present format; `obs` in alphabetical order.
     pub fn new(
         obs: Vec<ObsKey>,
         horizon: usize,
@@ -64,14 +70,20 @@ impl PolicyConfig {
     }
 }
 
+/// Weights with all that is needed to act by them.
 #[derive(Clone, Debug)]
 pub struct Policy {
+    /// What `policy.json` holds.
     pub config: PolicyConfig,
+    /// Where each parameter lies.
     pub net: Network,
+    /// The weights, in the network's order.
     pub parameters: Vec<f32>,
 }
 
 impl Policy {
+    /// A policy from its parts.
+    ///
     /// # Panics
     /// Parameters of another network.
     pub fn new(config: PolicyConfig, parameters: Vec<f32>) -> Self {
@@ -94,6 +106,8 @@ impl Policy {
         write_whole(&path, text.as_bytes()).map_err(|e| PolicyError::write(&path, e))
     }
 
+    /// Reads what [`Policy::save`] wrote.
+    ///
     /// # Errors
     /// A folder without a policy, damaged files, weights of another network, NaN among them.
     pub fn load(folder: &Path) -> Result<Self, PolicyError> {

@@ -41,9 +41,13 @@ pub fn wilson(successes: usize, trials: usize) -> [f64; 2] {
 /// The same episodes on two things: how often which of them succeeded.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
 pub struct Paired {
+    /// Episodes in which both succeeded.
     pub both: usize,
+    /// Episodes in which only the first succeeded.
     pub only_first: usize,
+    /// Episodes in which only the second succeeded.
     pub only_second: usize,
+    /// Episodes in which neither succeeded.
     pub neither: usize,
 }
 
@@ -77,10 +81,13 @@ impl Paired {
         out
     }
 
+    /// How many episodes there are.
     pub fn episodes(&self) -> usize {
         self.both + self.only_first + self.only_second + self.neither
     }
 
+    /// Difference, interval and P of the two success rates.
+    ///
     /// # Panics
     /// No episodes.
     pub fn compare(&self) -> Comparison {

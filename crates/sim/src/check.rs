@@ -7,6 +7,7 @@ use mujoco_rs::prelude::*;
 use serde::{Deserialize, Serialize};
 use std::path::Path;
 
+/// How a model is tried.
 #[derive(Clone, Copy, Debug)]
 pub struct CheckConfig {
     /// Servo speed of hinges, rad/s.
@@ -26,7 +27,9 @@ impl Default for CheckConfig {
 /// How one joint followed its servo.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct JointSweep {
+    /// Name of the joint.
     pub name: String,
+    /// Its limits, or one turn: rad or scene units.
     pub range: [f64; 2],
     /// Highest share of the range that the joint really reached, 0..1.
     pub reached: f64,
@@ -37,9 +40,13 @@ pub struct JointSweep {
 /// What MuJoCo made of one file.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct FileCheck {
+    /// File name, without the folder.
     pub file: String,
+    /// Bodies in the compiled model, the world included.
     pub bodies: usize,
+    /// Geoms in the compiled model, visual ones included.
     pub geoms: usize,
+    /// One entry a hinge or slide, in the model's order.
     pub sweeps: Vec<JointSweep>,
     /// Deepest contact between parts at rest in the first state, scene units.
     pub rest_penetration: f64,

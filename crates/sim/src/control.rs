@@ -24,7 +24,9 @@ pub const TORQUE_LIMITS: [f64; N] = [80.0, 80.0, 80.0, 80.0, 80.0, 12.0, 12.0];
 /// What the simulator says about the arm at one instant.
 #[derive(Clone, Debug)]
 pub struct ArmState {
+    /// Joint angles, rad.
     pub q: [f64; N],
+    /// Joint speeds, rad/s.
     pub qdot: [f64; N],
     /// Joint-space inertia, row-major 7 x 7.
     pub mass: [[f64; N]; N],
@@ -32,14 +34,18 @@ pub struct ArmState {
     pub bias: [f64; N],
     /// Rows 0..3 linear, 3..6 angular velocity of the grip site.
     pub jacobian: [[f64; N]; 6],
+    /// Of the grip site, world frame, m.
     pub position: DVec3,
+    /// `world_from_grip`.
     pub rotation: DMat3,
 }
 
 /// Where the grip site shall go.
 #[derive(Clone, Copy, Debug)]
 pub struct Goal {
+    /// World frame, m.
     pub position: DVec3,
+    /// `world_from_grip`.
     pub rotation: DMat3,
 }
 

@@ -53,6 +53,7 @@ pub struct Start {
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Outcome {
+    /// The joint stands where the task wants it.
     Success,
     /// No finger ever touched the moving part.
     NeverReached,
@@ -64,7 +65,9 @@ pub enum Outcome {
     KnockedAway,
 }
 
+/// A scene in motion: one episode after the other.
 pub struct Env {
+    /// The world that is simulated.
     pub scene: Scene,
     data: MjData<Arc<MjModel>>,
     goal: Goal,
@@ -83,6 +86,7 @@ pub struct Env {
 }
 
 impl Env {
+    /// The scene at the start of the episode of seed 0.
     pub fn new(scene: &Scene) -> Self {
         let goal = Goal { position: DVec3::ZERO, rotation: DMat3::IDENTITY };
         let grasp_sign = scene.task.place.rot * scene.task.grasp.rot;
@@ -247,6 +251,7 @@ impl Env {
         (self.moved_most - self.moved_start).abs()
     }
 
+    /// Whether the task is done at this moment.
     pub fn success(&self) -> bool {
         self.finite && self.scene.task.done(self.moved())
     }
@@ -314,10 +319,12 @@ impl Env {
         object::screw(&self.data, &self.scene.target.joint)
     }
 
+    /// Where the task's joint stands, in its own coordinate: rad or simulated metres.
     pub fn joint_value(&self) -> f64 {
         self.data.qpos()[self.scene.target.joint.qpos]
     }
 
+    /// Whether both fingers touch the moving part at this moment.
     pub fn holding(&self) -> bool {
         self.holding
     }

@@ -3,12 +3,26 @@
 /// What / where / what to try.
 #[derive(Debug, Clone, thiserror::Error)]
 pub enum SimError {
+    /// MuJoCo refuses a model.
     #[error(
         "MuJoCo cannot load the model: {what}\n  where: {path}\n  try: open it with `python -m mujoco.viewer --mjcf={path}`, or build the twin again"
     )]
-    Load { path: String, what: String },
+    Load {
+        /// The model file.
+        path: String,
+        /// What MuJoCo says, in one line.
+        what: String,
+    },
+    /// A task, an object or an action that cannot be worked with.
     #[error("{what}\n  where: {place}\n  try: {hint}")]
-    Task { what: String, place: String, hint: String },
+    Task {
+        /// What is wrong.
+        what: String,
+        /// File, field or argument.
+        place: String,
+        /// What to try.
+        hint: String,
+    },
 }
 
 impl SimError {

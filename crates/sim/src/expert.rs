@@ -26,6 +26,7 @@ enum Phase {
     Release(usize),
 }
 
+/// The demonstrator in one episode.
 pub struct Expert {
     rng: fastrand::Rng,
     phase: Phase,
@@ -44,6 +45,7 @@ pub struct Expert {
 }
 
 impl Expert {
+    /// A person's habits for one episode, drawn from `seed`.
     pub fn new(seed: u64) -> Self {
         let mut rng = fastrand::Rng::with_seed(seed ^ 0x6465_6d6f_6e73_7472);
         let mut between = |lo: f64, hi: f64| lo + (hi - lo) * rng.f64();

@@ -65,7 +65,9 @@ const BEHIND: f64 = 0.12;
 /// One place to hold, with the object's turn on the table.
 #[derive(Clone, Debug)]
 pub struct Candidate {
+    /// The task with this place to hold and this turn on the table.
     pub task: TaskSpec,
+    /// How good the place is, without unit: more is better.
     pub score: f64,
 }
 

@@ -5,6 +5,8 @@
 //! judges, `control` is the arm's control law, `expert` demonstrates, `spoil` makes wrong objects on purpose, `path` says
 //! whether a part ended where the true joint would have it.
 
+#![warn(missing_docs)]
+
 pub mod check;
 pub mod control;
 pub mod env;

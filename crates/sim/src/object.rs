@@ -53,11 +53,15 @@ pub(crate) fn stands_free(spec: &MjSpec) -> bool {
 pub struct ObjectJoint {
     /// As in the object's file.
     pub name: String,
+    /// Joint number in the compiled model.
     pub id: usize,
+    /// Where its value stands in `qpos`.
     pub qpos: usize,
+    /// Where its speed stands in `qvel`.
     pub dof: usize,
     /// The body that it moves.
     pub body: usize,
+    /// True for a slide, false for a hinge.
     pub slides: bool,
     /// Its limits, or one turn.
     pub range: [f64; 2],
@@ -159,9 +163,11 @@ pub(crate) fn screw<M: ModelType>(data: &MjData<M>, joint: &ObjectJoint) -> Scre
 /// The joint that the task is about, in this object or twin.
 #[derive(Clone, Debug)]
 pub struct Target {
+    /// The joint in the compiled model.
     pub joint: ObjectJoint,
-    /// Joint values of the two ends.
+    /// Joint value when closed, rad or simulated metres.
     pub closed: f64,
+    /// Joint value when open.
     pub open: f64,
     /// The grasp frame, fixed to the moving body.
     pub body_from_grasp: Pose,

@@ -33,6 +33,7 @@ pub struct SpotPath {
 }
 
 impl SpotPath {
+    /// The way on which the scene's joint leads the grasped spot.
     pub fn of(scene: &Scene) -> Self {
         let target = &scene.target;
         let mut screw = target.screw;

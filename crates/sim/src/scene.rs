@@ -24,6 +24,7 @@ const OBJECT_BODY: &str = "<body name=\"object\"";
 pub struct SceneConfig {
     /// Model file of the object or twin.
     pub object: PathBuf,
+    /// What is made wrong with the target joint, in this order.
     pub spoil: Vec<Spoil>,
     /// Keep what only pictures need.
     pub visuals: bool,
@@ -32,8 +33,11 @@ pub struct SceneConfig {
 /// A compiled world; cheap to clone, shared by all its environments.
 #[derive(Clone, Debug)]
 pub struct Scene {
+    /// The compiled model.
     pub model: Arc<MjModel>,
+    /// What shall be done in it.
     pub task: Arc<TaskSpec>,
+    /// The joint that the task is about.
     pub target: Target,
     /// The model as MJCF, the object at its nominal place.
     pub xml: Arc<String>,
@@ -58,6 +62,8 @@ pub(crate) struct Ids {
 }
 
 impl Scene {
+    /// Puts the object on the table and compiles the whole; takes from milliseconds to seconds.
+    ///
     /// # Errors
     /// When the model cannot be loaded or has no part that fits the task.
     pub fn new(config: &SceneConfig, task: &TaskSpec) -> Result<Self, SimError> {

@@ -9,6 +9,7 @@ use crate::SimError;
 use glam::{DQuat, DVec3};
 use serde::{Deserialize, Serialize};
 
+/// One way to make the target joint wrong.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Spoil {

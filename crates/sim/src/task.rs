@@ -8,6 +8,7 @@ use glam::{DQuat, DVec3};
 use hingecast_geom::Pose;
 use serde::{Deserialize, Serialize};
 
+/// What shall be done with a joint.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum TaskKind {
@@ -20,8 +21,10 @@ pub enum TaskKind {
 }
 
 impl TaskKind {
+    /// The names on the command line, in the order of the variants.
     pub const NAMES: [&str; 3] = ["open", "close", "hinged-box"];
 
+    /// Its name on the command line.
     pub fn name(self) -> &'static str {
         Self::NAMES[self as usize]
     }
@@ -34,6 +37,7 @@ impl TaskKind {
         }
     }
 
+    /// The kind of a name on the command line; `None` when there is no such kind.
     pub fn from_name(name: &str) -> Option<Self> {
         [Self::Open, Self::Close, Self::HingedBox].into_iter().find(|k| k.name() == name)
     }
@@ -51,6 +55,7 @@ pub const HORIZON: usize = 400;
 /// One task on one object, and on its twins.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct TaskSpec {
+    /// What shall be done.
     pub kind: TaskKind,
     /// Name of the joint in the object that the task was made from.
     pub joint: String,
@@ -58,7 +63,7 @@ pub struct TaskSpec {
     pub scale: f64,
     /// Nominal `world_from_base`; lengths are simulated metres.
     pub place: Pose,
-    /// Half widths of the uniform draw of x [m], y [m], yaw [rad] about `place`.
+    /// Half widths of the uniform draw of x (m), y (m), yaw (rad) about `place`.
     pub spread: [f64; 3],
     /// Where the gripper holds the moving part when the joint is closed, base frame: z approaches, y closes.
     pub grasp: Pose,
@@ -70,6 +75,7 @@ pub struct TaskSpec {
     pub part_centre: DVec3,
     /// |open - closed| of the joint, rad or simulated metres.
     pub travel: f64,
+    /// Control steps of 50 ms after which an episode has failed.
     pub horizon: usize,
 }
 

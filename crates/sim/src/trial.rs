@@ -18,12 +18,16 @@ const SIZES: [f64; 5] = [1.0, 0.75, 1.4, 0.55, 1.8];
 /// What was found out on the way.
 #[derive(Clone, Debug)]
 pub struct Made {
+    /// The task with the place to hold that worked best.
     pub task: TaskSpec,
     /// Successes of `TRIES` with the place that was taken.
     pub worked: usize,
+    /// How often it was tried.
     pub of: usize,
 }
 
+/// The task of an object: the first place to hold that works in every try, or else the best.
+///
 /// # Errors
 /// When the gripper fits nowhere, or the demonstrator never succeeds.
 pub fn make_task(path: &Path, kind: TaskKind, joint: Option<&str>, scale: Option<f64>) -> Result<Made, SimError> {

@@ -18,11 +18,13 @@ pub struct Rates {
     pub means: f32,
     /// Natural-log units.
     pub scales: f32,
+    /// Of the four numbers before they are normalised.
     pub quats: f32,
     /// Logit units.
     pub opacity: f32,
     /// Coefficients of degree 0; 1 unit is 0.28 of full brightness.
     pub sh0: f32,
+    /// Coefficients of degree 1.
     pub sh1: f32,
 }
 

@@ -15,6 +15,7 @@ const TENSORS: [&str; 3] = ["params", "first", "second"];
 /// Where a fit stands.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Checkpoint {
+    /// Iterations done.
     pub iteration: usize,
     /// Radius of the object that the fit works with, scene units.
     pub extent: f32,
@@ -24,6 +25,8 @@ fn bad(path: &Path, what: impl Into<String>) -> SplatError {
     SplatError::Checkpoint { path: path.to_path_buf(), what: what.into() }
 }
 
+/// Writes the engine and where its fit stands to `path`.
+///
 /// # Errors
 /// The folder cannot be written.
 pub fn save(engine: &Engine, checkpoint: &Checkpoint, path: &Path) -> Result<(), SplatError> {

@@ -17,6 +17,7 @@ use hingecast_geom::{Camera, Gaussians, Pose};
 /// What to draw besides colour, depth and alpha.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct RenderOptions<'a> {
+    /// Colour behind the gaussians, rgb, 0..1.
     pub background: [f32; 3],
     /// Values blended like colours (labels, one-hot parts, normals): (gaussians, channels), gaussian-major.
     pub extra: &'a [f32],
@@ -27,7 +28,9 @@ pub struct RenderOptions<'a> {
 /// A rendered picture, row by row.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Render {
+    /// Pixels in a row.
     pub width: usize,
+    /// Rows.
     pub height: usize,
     /// (h, w, 3) over the background.
     pub rgb: Vec<f32>,
@@ -121,14 +124,17 @@ impl Engine {
         })
     }
 
+    /// Number of gaussians.
     pub fn len(&self) -> usize {
         self.params.len()
     }
 
+    /// Never true: an empty set is refused.
     pub fn is_empty(&self) -> bool {
         self.params.is_empty()
     }
 
+    /// The instruction set asked for; it counts as plain where the CPU lacks it.
     pub fn simd(&self) -> Simd {
         self.simd
     }
@@ -210,6 +216,7 @@ impl Engine {
         Ok(())
     }
 
+    /// `world_from_group` of every group; empty without groups.
     pub fn poses(&self) -> &[Pose] {
         &self.poses
     }
@@ -219,6 +226,8 @@ impl Engine {
         &self.groups[..self.groups.len().min(self.len())]
     }
 
+    /// Draws the gaussians as `camera` sees them.
+    ///
     /// # Errors
     /// An impossible camera, extra values of the wrong length or not finite, too many channels.
     pub fn render(&mut self, camera: &Camera, options: &RenderOptions) -> Result<Render, SplatError> {

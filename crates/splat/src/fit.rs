@@ -16,11 +16,13 @@ use hingecast_geom::Progress;
 use serde::{Deserialize, Serialize};
 use std::path::PathBuf;
 
+/// How long and how fast to fit.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default)]
 pub struct FitConfig {
     /// Steps, one view each.
     pub iterations: usize,
+    /// Of the order of the views and of everything random.
     pub seed: u64,
     /// Share of the iterations done at half size.
     pub half_size_share: f64,
@@ -36,6 +38,7 @@ pub struct FitConfig {
     pub relocate_every: usize,
     /// Where to save, if at all, and how often. An existing file is resumed from.
     pub checkpoint: Option<PathBuf>,
+    /// Iterations between two saves.
     pub checkpoint_every: usize,
 }
 
@@ -56,6 +59,7 @@ impl Default for FitConfig {
     }
 }
 
+/// What came of a fit.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct FitReport {
     /// Iterations of the fit, resumed ones included.

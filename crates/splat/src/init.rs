@@ -15,6 +15,7 @@ const DEPTH_STEP: f64 = 0.03;
 /// A pixel's piece of surface.
 #[derive(Clone, Copy, Debug)]
 pub struct SurfaceSample {
+    /// Where it is: world (or canonical) frame, scene units.
     pub position: Vec3,
     /// Unit, towards the camera.
     pub normal: Vec3,

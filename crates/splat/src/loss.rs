@@ -28,6 +28,7 @@ pub enum DepthLoss {
     L1,
 }
 
+/// How much each term of the loss counts.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default)]
 pub struct LossConfig {
@@ -35,6 +36,7 @@ pub struct LossConfig {
     pub ssim: f32,
     /// Weight of the depth loss; 0 ignores depth.
     pub depth: f32,
+    /// How a pixel's depth error counts.
     pub depth_loss: DepthLoss,
     /// Depth error in scene units that counts as 1 (or ln 2); about 1 % of the object.
     pub depth_scale: f32,
@@ -57,7 +59,9 @@ pub struct LossTerms {
     pub l1: f64,
     /// mean ssim, 1 is perfect
     pub ssim: f64,
+    /// Depth term: mean of w rho(|D - z A|), no unit.
     pub depth: f64,
+    /// Alpha term: mean of w max(|A - a| - s, 0), 0..1.
     pub alpha: f64,
     /// mean (x' - y)^2, for PSNR
     pub mse: f64,

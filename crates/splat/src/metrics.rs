@@ -3,6 +3,9 @@
 use crate::ssim::{C1, C2, Padded, WINDOW, moments};
 
 /// Peak signal to noise ratio in dB of values in 0..=1; capped at 120 for equal pictures, NaN for none.
+///
+/// # Panics
+/// When the pictures have different sizes.
 pub fn psnr(a: &[f32], b: &[f32]) -> f64 {
     assert_eq!(a.len(), b.len(), "pictures of one size");
     let sum: f64 = a.iter().zip(b).map(|(a, b)| f64::from(a - b).powi(2)).sum();
@@ -10,6 +13,9 @@ pub fn psnr(a: &[f32], b: &[f32]) -> f64 {
 }
 
 /// Mean structural similarity of two (h, w, 3) pictures: 11 x 11 window, sigma 1.5, zero outside, as in training.
+///
+/// # Panics
+/// When a picture is not (height, width, 3).
 pub fn ssim(a: &[f32], b: &[f32], width: usize, height: usize) -> f64 {
     assert_eq!(a.len(), 3 * width * height, "a is (h, w, 3)");
     assert_eq!(b.len(), a.len(), "pictures of one size");

@@ -17,8 +17,9 @@ pub mod plane {
     pub const SH0: usize = 11;
     /// Degree 1: basis y, z, x, each rgb. Absent when the degree is 0.
     pub const SH1: usize = 14;
-    /// Number of planes without and with degree 1.
+    /// Number of planes without degree 1.
     pub const COUNT_DEGREE_0: usize = 14;
+    /// Number of planes with degree 1.
     pub const COUNT_DEGREE_1: usize = 23;
 }
 
@@ -33,6 +34,7 @@ pub struct Planes {
 }
 
 impl Planes {
+    /// `count` planes (14 or 23) of `len` zeros.
     pub fn zeros(len: usize, count: usize) -> Self {
         Self { len, planes: vec![vec![0.0; len.next_multiple_of(PAD)]; count] }
     }
@@ -42,6 +44,7 @@ impl Planes {
         self.len
     }
 
+    /// True without gaussians.
     pub fn is_empty(&self) -> bool {
         self.len == 0
     }
@@ -75,12 +78,15 @@ impl Planes {
         std::array::from_fn(|j| self.planes[k + j][i])
     }
 
+    /// Overwrites parameter `k..k + W` of gaussian `i`.
     pub fn set<const W: usize>(&mut self, k: usize, i: usize, value: [f32; W]) {
         for j in 0..W {
             self.planes[k + j][i] = value[j];
         }
     }
 
+    /// From interchange layout.
+    ///
     /// # Errors
     /// Arrays of different lengths, no gaussians, NaN or inf.
     pub fn from_gaussians(g: &Gaussians) -> Result<Self, SplatError> {

@@ -41,6 +41,7 @@ pub struct Pool {
 }
 
 impl Pool {
+    /// `threads` counts the caller; 0 counts as 1.
     pub fn new(threads: usize) -> Self {
         let extra = threads.max(1) - 1;
         let shared = Arc::new(Shared {
@@ -62,6 +63,7 @@ impl Pool {
         Self { shared, workers }
     }
 
+    /// How many threads there are, the caller included.
     pub fn threads(&self) -> usize {
         self.workers.len() + 1
     }

@@ -18,6 +18,7 @@ pub enum Pixels<'a> {
 }
 
 impl Pixels<'_> {
+    /// How many values there are.
     pub fn len(&self) -> usize {
         match self {
             Self::F32(v) => v.len(),
@@ -25,10 +26,15 @@ impl Pixels<'_> {
         }
     }
 
+    /// True without values.
     pub fn is_empty(&self) -> bool {
         self.len() == 0
     }
 
+    /// Value `i`, scaled to 0..=1.
+    ///
+    /// # Panics
+    /// When `i` is not below [`Pixels::len`].
     pub fn at(&self, i: usize) -> f32 {
         match self {
             Self::F32(v) => v[i],
@@ -100,6 +106,8 @@ pub struct Target {
 }
 
 impl Target {
+    /// Crops the pictures of one view to the object and prepares them.
+    ///
     /// # Errors
     /// Wrong lengths, NaN or inf, negative depth.
     pub fn new(camera: &Camera, images: &TargetImages) -> Result<Self, SplatError> {
@@ -163,10 +171,12 @@ impl Target {
         })
     }
 
+    /// Where the view was taken from; its size is that of the picture.
     pub fn camera(&self) -> &Camera {
         &self.camera
     }
 
+    /// Colour behind the object, rgb, 0..1.
     pub fn background(&self) -> [f32; 3] {
         self.background
     }

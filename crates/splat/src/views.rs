@@ -9,7 +9,9 @@ use std::sync::Arc;
 /// `count` views behind a function, so that the caller decides what stays in memory.
 #[derive(Clone, Copy)]
 pub struct Views<'a> {
+    /// How many views there are.
     pub count: usize,
+    /// View `i`, 0 <= i < `count`; called once a step, so it should be quick.
     pub get: &'a dyn Fn(usize) -> Arc<Target>,
     /// Poses of the engine's groups in each view (see [`crate::Engine::set_groups`]); `None`: they stay as they are.
     pub poses: Option<&'a dyn Fn(usize) -> Vec<Pose>>,

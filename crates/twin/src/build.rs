@@ -52,7 +52,9 @@ impl Default for Config {
 
 /// What `build` reads besides the observations.
 pub struct Input<'a> {
+    /// Name of the object, as the simulator files get it.
     pub name: &'a str,
+    /// Parts and joints; every joint has a value for every state.
     pub tree: &'a KinematicTree,
     /// States of the recording: a tree without joints does not tell.
     pub n_states: usize,
@@ -60,7 +62,9 @@ pub struct Input<'a> {
     pub n_observations: usize,
     /// Diagonal of the object's box in the first state, scene units.
     pub diagonal: f64,
+    /// Lengths are metres; otherwise scene units.
     pub metric: bool,
+    /// Unit vector that points up in the world.
     pub up: DVec3,
 }
 
@@ -68,6 +72,9 @@ pub struct Input<'a> {
 ///
 /// # Errors
 /// What `load` answers, or [`Cancelled`].
+///
+/// # Panics
+/// When a joint has fewer values than `n_states`, or an observation is of a state beyond them.
 pub fn build<E: From<Cancelled> + Send>(
     input: &Input,
     load: &(dyn Fn(usize) -> Result<Observation, E> + Sync),

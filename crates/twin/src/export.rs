@@ -11,12 +11,20 @@ use hingecast_geom::{Gaussians, Pose, TriMesh};
 use serde_json::json;
 use std::path::{Path, PathBuf};
 
+/// Why a twin could not be written.
 #[derive(Debug, thiserror::Error)]
 pub enum ExportError {
+    /// The operating system refused to write.
     #[error(
         "cannot write {path}: {source}\n  where: the twin folder\n  try: free some disk space, or another -o folder"
     )]
-    Io { path: PathBuf, source: std::io::Error },
+    Io {
+        /// The file or folder.
+        path: PathBuf,
+        /// What the system said.
+        source: std::io::Error,
+    },
+    /// A mesh or the gaussians of a part could not be written.
     #[error(transparent)]
     Ply(#[from] PlyError),
 }
@@ -26,6 +34,9 @@ pub enum ExportError {
 ///
 /// # Errors
 /// When the disk refuses; the old folder is then still there.
+///
+/// # Panics
+/// When `splats` has fewer parts than gaussians.
 pub fn write(twin: &Twin, splats: Option<(&Gaussians, &[u8])>, dir: &Path) -> Result<(), ExportError> {
     let staging = dir.with_extension("tmp");
     let at = |path: &Path| {

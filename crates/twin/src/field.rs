@@ -14,9 +14,13 @@ pub const ONE_VOXEL: f32 = 1.0 / TRUNCATION;
 
 /// Signed distance on a dense grid, in units of the truncation: -1 inside .. +1 outside.
 pub struct Field {
+    /// Centre of voxel (0, 0, 0) in the canonical world frame, scene units.
     pub origin: Vec3,
+    /// Edge of a voxel, scene units.
     pub voxel: f32,
+    /// Voxels along x, y and z.
     pub dims: [usize; 3],
+    /// The distances, x fastest. (z, y, x)
     pub values: Vec<f32>,
     /// True where a ray or a surface said something.
     pub known: Vec<bool>,
@@ -118,6 +122,7 @@ impl Field {
         }
     }
 
+    /// Where voxel (x, y, z) stands in `values`.
     pub fn index(&self, x: usize, y: usize, z: usize) -> usize {
         (z * self.dims[1] + y) * self.dims[0] + x
     }

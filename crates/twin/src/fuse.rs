@@ -27,6 +27,7 @@ pub(crate) type Key = [i32; 3];
 
 /// Blocks near the surface of one part, with the running average in them.
 pub struct PartVolume {
+    /// Edge of a voxel, scene units.
     pub voxel: f32,
     truncation: f32,
     hits: BTreeMap<Key, u32>,
@@ -54,6 +55,7 @@ impl Block {
 }
 
 impl PartVolume {
+    /// Nothing seen yet; `voxel` is the edge of a voxel, scene units.
     pub fn new(voxel: f32) -> Self {
         Self {
             voxel,

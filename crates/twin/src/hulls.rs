@@ -8,8 +8,11 @@ use parry3d::transformation::vhacd::{VHACD, VHACDParameters};
 /// Resolution 128 and concavity 0.001 keep a drawer with thin walls open; the defaults fill 3 % of it.
 #[derive(Clone, Copy, Debug)]
 pub struct HullConfig {
+    /// Voxels along the longest side of the mesh.
     pub resolution: u32,
+    /// How far a piece may be from convex before it is cut again, 0..1; smaller gives more pieces.
     pub concavity: f32,
+    /// Most pieces; what is concave then stays so.
     pub max_hulls: u32,
 }
 

@@ -7,6 +7,7 @@ use glam::DVec3;
 use hingecast_geom::JointKind;
 use std::fmt::Write as _;
 
+/// The whole file. It names the mesh files that [`crate::write`] puts beside it.
 pub fn to_string(twin: &Twin) -> String {
     let mut out = String::new();
     let _ = writeln!(out, "<mujoco model=\"{}\">", escape(&twin.name));

@@ -44,6 +44,12 @@ type Cell = ([i32; 3], u8);
 /// Gives unknown pixels that have depth the part with the fewest contradictions, then the most support; ties go to
 /// the lowest part (the root). `labels[i]` are those of observation `i`; `poses[state][part]` world from canonical;
 /// `cell` is the edge of the cubes in which points are judged together, scene units.
+///
+/// # Errors
+/// What `load` answers.
+///
+/// # Panics
+/// When an observation is of a state without poses.
 pub fn resolve<E: Send>(
     labels: &mut [Vec<u8>],
     load: &(dyn Fn(usize) -> Result<Observation, E> + Sync),

@@ -20,6 +20,7 @@ const NORMALS: [Vec3; 13] = [
     Vec3::new(-1.0, 1.0, 1.0),
 ];
 
+/// Lowest and highest height of a set of points along each of the normals.
 pub struct Slabs([[f32; 2]; NORMALS.len()]);
 
 impl Slabs {
@@ -35,6 +36,7 @@ impl Slabs {
         Self(slabs)
     }
 
+    /// True where `x` lies between all of them.
     pub fn hold(&self, x: Vec3) -> bool {
         self.0.iter().zip(&NORMALS).all(|([lo, hi], n)| (*lo..=*hi).contains(&n.dot(x)))
     }

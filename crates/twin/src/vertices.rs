@@ -10,18 +10,24 @@ pub type Shown<'a, E> = dyn Fn(usize, &mut dyn FnMut(&[Observation])) -> Result<
 
 /// A vertex before a pixel: in front of the camera and in the picture, but perhaps behind something.
 pub struct Glimpse<'a> {
+    /// The observation that the pixel belongs to.
     pub seen: &'a Observation,
+    /// Part id of the vertex.
     pub part: u8,
     /// The pixel it falls on.
     pub pixel: usize,
-    /// Vertex and normal, camera frame.
+    /// Position of the vertex, camera frame, scene units.
     pub x: Vec3,
+    /// Unit normal of the vertex, camera frame.
     pub normal: Vec3,
     /// Camera frame from canonical frame.
     pub rot: Mat3,
 }
 
 /// Lets the vertices of all parts collect what at most `views` observations `say`. `poses[state][part]`: world from canonical. [part][vertex]
+///
+/// # Errors
+/// What `shown` answers.
 pub fn collect<T: Clone + Default + Send, E>(
     meshes: &[TriMesh],
     poses: &[Vec<Pose>],

@@ -14,21 +14,30 @@ use std::path::{Path, PathBuf};
 #[derive(Clone, Debug, PartialEq, Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Fix {
+    /// The frame goes out of the list; its images stay on the disk.
     DropFrame {
+        /// The `transforms.json`.
         file: PathBuf,
+        /// Position in its `frames`, from 0.
         index: usize,
     },
     /// The nearest rotation replaces a nearly rigid matrix.
     Orthonormalise {
+        /// The `transforms.json`.
         file: PathBuf,
+        /// Position in its `frames`, from 0.
         index: usize,
     },
+    /// A mask that marks the background is written inverted, under a new name.
     InvertMask {
+        /// The `transforms.json`.
         file: PathBuf,
+        /// Position in its `frames`, from 0.
         index: usize,
     },
     /// `depth_unit_scale_factor` of all frames times `factor`.
     ScaleDepth {
+        /// New scale over old scale.
         factor: f64,
     },
     /// All poses from OpenCV's to OpenGL's axes.

@@ -21,18 +21,24 @@ use std::path::{Path, PathBuf};
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Severity {
+    /// `build` cannot use the recording, or not this frame of it.
     Error,
+    /// `build` can go on; the result may suffer.
     Warning,
 }
 
 /// One thing that is wrong.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Finding {
+    /// Whether `build` can go on.
     pub severity: Severity,
     /// Stable name of the kind of finding, such as "depth-unit".
     pub code: &'static str,
+    /// What is wrong, in one sentence.
     pub what: String,
+    /// File, field and value.
     pub place: String,
+    /// What to try.
     pub hint: String,
     /// What `fix` would do about it.
     pub fix: Option<Fix>,
@@ -49,6 +55,7 @@ impl std::fmt::Display for Finding {
 /// Frames of one state.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize)]
 pub struct StateFrames {
+    /// The state that is counted.
     pub state: usize,
     /// Training frames that can be fitted: not wholly occluded.
     pub usable: usize,
@@ -56,6 +63,7 @@ pub struct StateFrames {
     pub partly_hidden: usize,
     /// Left out because the person hides the object.
     pub occluded: usize,
+    /// Held-out frames.
     pub test: usize,
 }
 
@@ -64,6 +72,7 @@ pub struct StateFrames {
 pub struct CheckReport {
     /// Errors first, then in the order of the recording.
     pub findings: Vec<Finding>,
+    /// One entry a state, in order; empty when the recording cannot be read.
     pub states: Vec<StateFrames>,
 }
 
@@ -71,6 +80,7 @@ pub struct CheckReport {
 const SHOWN_PER_CODE: usize = 3;
 
 impl CheckReport {
+    /// True when `build` cannot go on.
     pub fn has_errors(&self) -> bool {
         self.findings.iter().any(|f| f.severity == Severity::Error)
     }

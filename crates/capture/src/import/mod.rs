@@ -1,6 +1,6 @@
 //! Other layouts of the field into native recordings.
 //!
-//! Each layout's file lists its pictures as [`Shot`]s; `store` decodes, undistorts, brings depth and mask to the colour's
+//! Each layout's file lists its pictures as `Shot`s; `store` decodes, undistorts, brings depth and mask to the colour's
 //! size and writes them. World frame and scale stay the source's.
 
 mod artgs;
@@ -41,6 +41,7 @@ pub enum Format {
 }
 
 impl Format {
+    /// Every format with its name on the command line.
     pub const ALL: [(&'static str, Format); 7] = [
         ("auto", Format::Auto),
         ("nerfstudio", Format::Nerfstudio),
@@ -51,6 +52,7 @@ impl Format {
         ("dynamic3dgs", Format::Dynamic3dgs),
     ];
 
+    /// Its name on the command line.
     pub fn name(self) -> &'static str {
         Self::ALL.iter().find(|(_, f)| *f == self).map_or("auto", |(name, _)| name)
     }
@@ -71,9 +73,13 @@ impl Format {
 /// What was imported.
 #[derive(Clone, Debug)]
 pub struct ImportReport {
+    /// Folder of the native recording.
     pub recording: PathBuf,
+    /// The layout that was read; never [`Format::Auto`].
     pub format: Format,
+    /// How many joint states it has.
     pub states: usize,
+    /// How many frames it has, over all states.
     pub frames: usize,
 }
 

@@ -20,14 +20,19 @@ use std::path::{Path, PathBuf};
 /// An object with joints. `tree.parts[i]` names `parts[i]`; the joints' `values` are empty.
 #[derive(Clone, Debug, Default)]
 pub struct ArticulatedObject {
+    /// Name, for recordings and reports.
     pub name: String,
     /// The file it came from.
     pub source: PathBuf,
     /// Lengths are metres; PartNet-Mobility objects are scaled to a diagonal of about 2 instead.
     pub metric: bool,
+    /// Parts and joints; the screws stand in the canonical world frame.
     pub tree: KinematicTree,
+    /// Geometry of every part; index = part id.
     pub parts: Vec<PartGeometry>,
+    /// What the faces of all parts look like.
     pub materials: Vec<Material>,
+    /// What the materials refer to.
     pub textures: Vec<Texture>,
 }
 
@@ -36,10 +41,13 @@ pub struct ArticulatedObject {
 pub struct PartGeometry {
     /// Links of the source that this part is made of (fixed and minor joints merge links).
     pub links: Vec<String>,
+    /// Positions, scene units. (n, 3)
     pub vertices: Vec<Vec3>,
     /// Unit, or zero where the file has none.
     pub normals: Vec<Vec3>,
+    /// Texture coordinates, v up as in OBJ. (n, 2)
     pub uvs: Vec<Vec2>,
+    /// Indices of three vertices a triangle. (m, 3)
     pub faces: Vec<[u32; 3]>,
     /// Index into `materials`, one a face.
     pub materials: Vec<u32>,
@@ -48,6 +56,7 @@ pub struct PartGeometry {
 /// Diffuse colour (sRGB, 0..1) times texture.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Material {
+    /// sRGB, 0..1.
     pub color: [f32; 3],
     /// Index into the object's textures.
     pub texture: Option<usize>,

@@ -19,6 +19,9 @@ struct Level {
 
 impl Texture {
     /// Reads a PNG or JPEG; transparent texels come over white.
+    ///
+    /// # Errors
+    /// When the file is missing or cannot be decoded.
     pub fn read(path: &Path) -> Result<Self, CaptureError> {
         let image = images::read(path)?.into_rgba8();
         let (width, height) = (image.width() as usize, image.height() as usize);

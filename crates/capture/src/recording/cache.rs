@@ -39,6 +39,7 @@ impl ViewCache {
         Self { recording: recording.clone(), budget_bytes, kept: Mutex::default() }
     }
 
+    /// The recording whose views these are.
     pub fn recording(&self) -> &Recording {
         &self.recording
     }

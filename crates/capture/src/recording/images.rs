@@ -7,6 +7,9 @@ use image::{DynamicImage, ExtendedColorType, ImageEncoder};
 use std::path::Path;
 
 /// Decodes an image file.
+///
+/// # Errors
+/// When the file is missing, cut short, or of a format that is not known.
 pub fn read(path: &Path) -> Result<DynamicImage, CaptureError> {
     let bytes = std::fs::read(path).map_err(|e| {
         let what =
@@ -27,6 +30,9 @@ pub fn read(path: &Path) -> Result<DynamicImage, CaptureError> {
 }
 
 /// Depth in stored units (h*w, row-major) with its size: grey PNG of 8 or 16 bits, or .npy of (h, w) numbers.
+///
+/// # Errors
+/// When the file is missing or broken, is coloured, or is no array of two dimensions.
 pub fn read_depth(path: &Path) -> Result<(Vec<f32>, usize, usize), CaptureError> {
     if path.extension().is_some_and(|e| e == "npy") {
         return read_depth_npy(path);
@@ -61,6 +67,9 @@ fn read_depth_npy(path: &Path) -> Result<(Vec<f32>, usize, usize), CaptureError>
 }
 
 /// Any real-valued .npy array as row-major f64 with its shape.
+///
+/// # Errors
+/// When the file is missing, is no .npy array of real numbers, or is in Fortran order.
 pub fn read_npy(path: &Path) -> Result<(Vec<f64>, Vec<usize>), CaptureError> {
     let bytes = std::fs::read(path).map_err(|e| CaptureError::read(path, e))?;
     let bad = |e: &dyn std::fmt::Display| {
@@ -86,16 +95,25 @@ pub fn read_npy(path: &Path) -> Result<(Vec<f64>, Vec<usize>), CaptureError> {
 }
 
 /// Grey 8-bit PNG, fast compression.
+///
+/// # Errors
+/// When the file cannot be written.
 pub fn write_gray(path: &Path, pixels: &[u8], w: usize, h: usize) -> Result<(), CaptureError> {
     write_png(path, pixels, w, h, ExtendedColorType::L8)
 }
 
 /// RGB 8-bit PNG, fast compression.
+///
+/// # Errors
+/// When the file cannot be written.
 pub fn write_rgb(path: &Path, pixels: &[u8], w: usize, h: usize) -> Result<(), CaptureError> {
     write_png(path, pixels, w, h, ExtendedColorType::Rgb8)
 }
 
 /// Grey 16-bit PNG of depth in stored units; 0 = unknown.
+///
+/// # Errors
+/// When the file cannot be written.
 pub fn write_depth(path: &Path, pixels: &[u16], w: usize, h: usize) -> Result<(), CaptureError> {
     // The encoder wants native byte order and swaps by itself.
     let bytes: Vec<u8> = pixels.iter().flat_map(|p| p.to_ne_bytes()).collect();
@@ -110,6 +128,9 @@ fn write_png(path: &Path, bytes: &[u8], w: usize, h: usize, color: ExtendedColor
 }
 
 /// Writes a file to a temporary name beside it and renames: readers never see half a file.
+///
+/// # Errors
+/// When the file cannot be written.
 pub fn write_file(path: &Path, bytes: &[u8]) -> Result<(), CaptureError> {
     write_whole(path, bytes).map_err(|e| CaptureError::write(path, e))
 }

@@ -28,22 +28,30 @@ use transforms::{Document, Entry, Problem};
 /// Whether a frame may be fitted, or is kept for measuring.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum Split {
+    /// May be fitted.
     Train,
+    /// Held out: only for measuring.
     Test,
 }
 
 /// One picture of one state. Paths are absolute.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Frame {
+    /// Number of the joint configuration, from 0.
     pub state: usize,
     /// Number of the view within its state.
     pub view: usize,
+    /// Whether it may be fitted.
     pub split: Split,
+    /// Where it was taken from; its size is that of all images of the frame.
     pub camera: Camera,
+    /// The colour image.
     pub color: PathBuf,
+    /// The depth image, if there is one.
     pub depth: Option<PathBuf>,
     /// Scene units per stored depth unit.
     pub depth_scale: f64,
+    /// The object's mask (non-zero = object), if there is one.
     pub mask: Option<PathBuf>,
     /// The whole frame is hidden by the person: leave it out.
     pub occluded: bool,
@@ -56,8 +64,11 @@ pub struct Frame {
 /// All frames of all states; pixels are read by [`Recording::load`].
 #[derive(Clone, Debug, PartialEq)]
 pub struct Recording {
+    /// Folder that holds `transforms.json`.
     pub root: PathBuf,
+    /// Name of the recording.
     pub name: String,
+    /// All frames, in file order.
     pub frames: Vec<Frame>,
     /// States with training frames: 0..n_states. Held-out states follow and have test frames only.
     pub n_states: usize,

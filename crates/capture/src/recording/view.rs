@@ -8,6 +8,7 @@ use std::path::Path;
 /// The pixels of one frame, row-major, w*h from its camera.
 #[derive(Clone, Debug, PartialEq)]
 pub struct View {
+    /// The frame's camera: w, h and pose.
     pub camera: Camera,
     /// sRGB (h, w, 3).
     pub rgb: Vec<u8>,

@@ -36,6 +36,7 @@ pub struct SynthConfig {
     pub play: bool,
     /// Write the truth folder beside the recording.
     pub truth: bool,
+    /// Of everything random: the same seed gives the same recording.
     pub seed: u64,
 }
 
@@ -64,6 +65,7 @@ impl Default for SynthConfig {
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Noise {
+    /// A perfect sensor.
     #[default]
     None,
     /// Intel RealSense D435: see `noise.rs`.
@@ -73,9 +75,11 @@ pub enum Noise {
 /// What was recorded.
 #[derive(Clone, Debug)]
 pub struct SynthReport {
+    /// Folder of the recording.
     pub recording: PathBuf,
     /// `None` when the configuration wanted none.
     pub truth: Option<PathBuf>,
+    /// How many frames were written, over all states.
     pub frames: usize,
     /// Joint name, first and last value of its play.
     pub ranges: Vec<(String, [f64; 2])>,

@@ -18,6 +18,7 @@ use hingecast_geom::{JointKind, TriMesh};
 pub struct UsefulRange {
     /// Radians or scene units; `lower` is the closed end.
     pub lower: f64,
+    /// The open end.
     pub upper: f64,
     /// Only when other joints are open: a rack behind a door.
     pub behind: bool,

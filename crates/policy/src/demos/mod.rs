@@ -28,7 +28,9 @@ pub struct Episode {
     pub actions: Vec<[f64; ACTION_SIZE]>,
     /// T states of the simulator, before each action.
     pub states: Vec<Vec<f64>>,
+    /// T rewards, each earned by the action of the same index.
     pub rewards: Vec<f64>,
+    /// T flags: whether the episode was over after the action.
     pub dones: Vec<bool>,
     /// Per key T rows: what was seen before each action.
     pub obs: BTreeMap<String, Vec<Vec<f64>>>,
@@ -41,6 +43,7 @@ pub struct Episode {
 pub struct Demos {
     /// env_name, type, env_kwargs: what robomimic needs to make the environment again.
     pub env_args: serde_json::Value,
+    /// The demonstrations; index = the number in the name.
     pub episodes: Vec<Episode>,
     /// Named subsets: `train`, `valid`, ... -> episode names.
     pub masks: BTreeMap<String, Vec<String>>,

@@ -6,7 +6,7 @@ use rust_hdf5::{DatatypeMessage, H5Dataset, H5File, H5Group, Hdf5Error};
 use std::collections::BTreeMap;
 use std::path::Path;
 
-/// Reads all demonstrations of `path`. Where numbers are missing among demo_<i>, the episodes move up and the masks follow.
+/// Reads all demonstrations of `path`. Where numbers are missing among `demo_<i>`, the episodes move up and the masks follow.
 /// Observations that are pictures (more than two axes) are left out.
 ///
 /// # Errors

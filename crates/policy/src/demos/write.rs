@@ -8,7 +8,7 @@ use std::path::Path;
 /// Writes `demos` to a temporary name and renames it, so that a file is whole or absent.
 ///
 /// # Errors
-/// Demonstrations that [`super::read`] would refuse, or a folder that cannot be written.
+/// Demonstrations that [`super::read()`] would refuse, or a folder that cannot be written.
 pub fn write(path: &Path, demos: &Demos) -> Result<(), PolicyError> {
     check(demos, &path.display().to_string())?;
     let mut name = path.file_name().unwrap_or_default().to_os_string();

@@ -13,21 +13,27 @@ const EPSILON: f32 = 1e-8;
 /// Numbers that one thread updates at a time: three arrays of this fit into a core's cache.
 const BLOCK: usize = 16_384;
 
+/// The state of the optimiser: one number of each mean per parameter.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Adam {
-    /// Running means of the gradient and of its square.
+    /// Running means of the gradient.
     pub first: Vec<f32>,
+    /// Running means of the square of the gradient.
     pub second: Vec<f32>,
     /// Steps taken.
     pub steps: u64,
 }
 
 impl Adam {
+    /// Before the first step of so many parameters.
     pub fn new(parameters: usize) -> Self {
         Self { first: vec![0.0; parameters], second: vec![0.0; parameters], steps: 0 }
     }
 
     /// One step along the sum of `gradients`, added in their order.
+    ///
+    /// # Panics
+    /// When the parameters or a gradient are not as many as the state is for.
     pub fn step(&mut self, parameters: &mut [f32], gradients: &[&[f32]], rate: f64) {
         assert!(parameters.len() == self.first.len() && gradients.iter().all(|g| g.len() == parameters.len()));
         self.steps += 1;
@@ -49,12 +55,14 @@ impl Adam {
 }
 
 vectorised! {
+    /// Adds `from` to `to`, number by number.
     pub fn add(to: &mut [f32], from: &[f32]) {
         to.iter_mut().zip(from).for_each(|(t, f)| *t += f);
     }
 }
 
 vectorised! {
+    /// One block: both means, then the parameters; `g` is the gradient.
     pub fn update(p: &mut [f32], m: &mut [f32], v: &mut [f32], g: &[f32], rate: f32, root: f32) {
         let n = g.len();
         let (p, m, v) = (&mut p[..n], &mut m[..n], &mut v[..n]);

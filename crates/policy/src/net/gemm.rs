@@ -13,11 +13,16 @@ pub struct Matrix<'a> {
 }
 
 impl<'a> Matrix<'a> {
+    /// `data` as a (rows, columns) matrix.
+    ///
+    /// # Panics
+    /// When `data` does not have rows x columns numbers.
     pub fn new(data: &'a [f32], rows: usize, columns: usize) -> Self {
         assert_eq!(data.len(), rows * columns);
         Self { data, rows, columns, strides: [columns as isize, 1] }
     }
 
+    /// The same numbers as a (columns, rows) matrix; nothing is copied.
     pub fn transposed(self) -> Self {
         Self { rows: self.columns, columns: self.rows, strides: [self.strides[1], self.strides[0]], ..self }
     }

@@ -60,6 +60,7 @@ pub struct Transposed {
 }
 
 impl Transposed {
+    /// Transposes the layer's weights as they are in `parameters` now.
     pub fn update(&mut self, layer: &LstmLayer, parameters: &[f32]) {
         transpose(&parameters[layer.weight_ih.clone()], layer.inputs, &mut self.weight_ih);
         transpose(&parameters[layer.weight_hh.clone()], layer.hidden, &mut self.weight_hh);

@@ -24,6 +24,7 @@ pub fn exp(x: f32) -> f32 {
     p * f32::from_bits(power)
 }
 
+/// 1 / (1 + e^-x).
 #[inline(always)]
 pub fn sigmoid(x: f32) -> f32 {
     1.0 / (1.0 + exp(-x))

@@ -6,7 +6,7 @@
 //! ```
 //! Names, order of parameters and initial values are those of robomimic 0.3 on PyTorch (`models/base_nets.py`,
 //! `models/policy_nets.py`), so that weights go from one to the other by name. Everything is row-major f32; a batch of B
-//! sequences of T steps is T x B rows, the rows of one time together. [`reference`] is the slow twin in f64.
+//! sequences of T steps is T x B rows, the rows of one time together. [`mod@reference`] is the slow twin in f64.
 
 mod adam;
 mod gemm;
@@ -38,6 +38,7 @@ pub enum Head {
     Gmm,
 }
 
+/// The shape of a network.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct NetConfig {
@@ -74,6 +75,9 @@ impl Default for NetConfig {
 
 impl NetConfig {
     /// What no network can be made of: in words, with the field's name and value.
+    ///
+    /// # Errors
+    /// The first such field.
     pub fn check(&self) -> Result<(), String> {
         let sizes = [("rnn_layers", self.rnn_layers, 0, 16), ("num_modes", self.num_modes, 1, 1000)];
         let hidden = [("rnn_hidden", self.rnn_hidden)].into_iter();
@@ -97,7 +101,9 @@ impl NetConfig {
 pub struct Tensor {
     /// robomimic's name.
     pub name: String,
+    /// Rows and columns of a matrix; one number for a vector.
     pub shape: Vec<usize>,
+    /// Where its numbers, row-major, lie among the parameters.
     pub range: Range<usize>,
     /// Initial values are uniform in +- this.
     bound: f64,
@@ -129,6 +135,7 @@ struct LstmLayer {
 /// The shape of a network: where each parameter lies. The numbers themselves are with the caller.
 #[derive(Clone, Debug)]
 pub struct Network {
+    /// The shape that it was made from.
     pub config: NetConfig,
     /// Numbers of an observation.
     pub inputs: usize,
@@ -141,6 +148,7 @@ pub struct Network {
 }
 
 impl Network {
+    /// Lays the parameters out for observations of `inputs` numbers.
     pub fn new(config: &NetConfig, inputs: usize) -> Self {
         let mut net =
             Self { config: config.clone(), inputs, tensors: vec![], lstm: vec![], mlp: vec![], heads: vec![] };

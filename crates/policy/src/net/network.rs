@@ -13,9 +13,13 @@ const PART: usize = 50;
 /// Sequences with the actions to learn. `observations`: (sequences, steps, inputs); `actions`: (sequences, steps, 7).
 #[derive(Clone, Copy)]
 pub struct Batch<'a> {
+    /// Number of sequences.
     pub sequences: usize,
+    /// Steps of every sequence.
     pub steps: usize,
+    /// What was seen before each action, as it goes into the network.
     pub observations: &'a [f32],
+    /// What the demonstrator did then, each number in [-1, 1].
     pub actions: &'a [f32],
 }
 
@@ -52,11 +56,18 @@ impl Workspace {
 
 impl Network {
     /// Mean loss over all rows of the batch; no gradients.
+    ///
+    /// # Panics
+    /// When the batch is empty, its arrays do not fit its sizes, or the parameters are of another
+    /// network.
     pub fn loss(&self, parameters: &[f32], batch: &Batch, workspace: &mut Workspace) -> f64 {
         self.run(parameters, batch, workspace, false)
     }
 
     /// Mean loss over all rows of the batch; the gradient is in the workspace afterwards.
+    ///
+    /// # Panics
+    /// As [`Network::loss`].
     pub fn loss_and_gradient(&self, parameters: &[f32], batch: &Batch, workspace: &mut Workspace) -> f64 {
         self.run(parameters, batch, workspace, true)
     }

@@ -16,6 +16,7 @@ const FORMAT: &str = "hingecast-training-1";
 /// Losses at one step.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct LossRecord {
+    /// Steps taken until then.
     pub step: usize,
     /// Mean over the batches since the record before.
     pub train: f64,
@@ -33,25 +34,36 @@ struct Note {
     loss_count: usize,
 }
 
+/// A training between two steps.
 pub struct State {
+    /// The weights, in the network's order.
     pub parameters: Vec<f32>,
+    /// The state of the optimiser.
     pub adam: Adam,
     /// Sum of the losses of the batches since the last record, and how many they are.
     pub loss_sum: f64,
+    /// How many losses are in `loss_sum`.
     pub loss_count: usize,
+    /// The records so far, in the order of the steps.
     pub history: Vec<LossRecord>,
 }
 
 impl State {
+    /// Before the first step.
     pub fn new(net: &Network, seed: u64) -> Self {
         let parameters = net.initial_parameters(seed);
         Self { adam: Adam::new(parameters.len()), parameters, loss_sum: 0.0, loss_count: 0, history: Vec::new() }
     }
 
+    /// Steps taken.
     pub fn step(&self) -> usize {
         self.adam.steps as usize
     }
 
+    /// Writes the checkpoint; `stamp` says what it belongs to.
+    ///
+    /// # Errors
+    /// The file cannot be written.
     pub fn save(&self, net: &Network, stamp: &str, path: &Path) -> Result<(), PolicyError> {
         let history: Vec<f64> =
             self.history.iter().flat_map(|r| [r.step as f64, r.train, r.valid.unwrap_or(f64::NAN)]).collect();
@@ -69,6 +81,9 @@ impl State {
     }
 
     /// `None`: there is no checkpoint, or it is one of other settings or demonstrations.
+    ///
+    /// # Errors
+    /// A file that cannot be read or is damaged.
     pub fn load(net: &Network, stamp: &str, path: &Path) -> Result<Option<Self>, PolicyError> {
         let bytes = match std::fs::read(path) {
             Ok(bytes) => bytes,

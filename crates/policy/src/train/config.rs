@@ -4,6 +4,7 @@ use crate::PolicyError;
 use crate::net::{Head, NetConfig};
 use serde::{Deserialize, Serialize};
 
+/// A named set of settings.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Preset {
@@ -19,6 +20,7 @@ pub enum Preset {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct TrainConfig {
+    /// What the settings began as.
     pub preset: Preset,
     /// Seed of initial weights, order of windows, and the split where the file has no masks.
     pub seed: u64,
@@ -36,8 +38,9 @@ pub struct TrainConfig {
     pub normalize_obs: bool,
     /// Observations that the policy sees.
     pub obs: Vec<String>,
-    /// Mask of the demonstrations to learn from, and of those to validate with.
+    /// Mask of the demonstrations to learn from.
     pub train_mask: String,
+    /// Mask of the demonstrations to validate with.
     pub valid_mask: String,
     /// Share of the demonstrations kept for validation where the file lacks these masks.
     pub valid_share: f64,
@@ -47,6 +50,7 @@ pub struct TrainConfig {
     pub checkpoint_every: usize,
     /// Steps between two policies kept in snapshots/; 0 = none. Likelihood is no guide to success: roll them out.
     pub snapshot_every: usize,
+    /// Shape of the network.
     pub net: NetConfig,
 }
 
@@ -57,6 +61,7 @@ impl Default for TrainConfig {
 }
 
 impl TrainConfig {
+    /// All settings of a preset, seed 0.
     pub fn preset(preset: Preset) -> Self {
         // robomimic: 2000 epochs of 100 steps, checks and checkpoints every 50 epochs.
         let bc_rnn = Self {

@@ -9,18 +9,24 @@ use crate::{ACTION_SIZE, Demos, Episode, PolicyError};
 /// robomimic adds this to every deviation, so that constant numbers do not divide by zero.
 const LEAST_STD: f64 = 1e-3;
 
+/// Demonstrations as training wants them: prepared rows, and windows into them.
 pub struct Dataset {
+    /// What is observed, in alphabetical order: the columns of the rows.
     pub obs: Vec<ObsKey>,
+    /// What was done to the rows; `None`: nothing.
     pub normalization: Option<Normalization>,
     inputs: usize,
     /// (steps of all demonstrations, inputs), normalised.
     observations: Vec<f32>,
     /// (steps of all demonstrations, 7)
     actions: Vec<f32>,
+    /// Windows to learn from, one from every step.
     pub train: Vec<Window>,
+    /// Windows to validate with; may be empty.
     pub valid: Vec<Window>,
-    /// Demonstrations in either.
+    /// Demonstrations to learn from.
     pub train_demos: usize,
+    /// Demonstrations to validate with.
     pub valid_demos: usize,
 }
 
@@ -32,6 +38,8 @@ pub struct Window {
 }
 
 impl Dataset {
+    /// Joins the wanted observations into rows, normalises them, and splits the demonstrations.
+    ///
     /// # Errors
     /// An observation that the demonstrations lack, actions outside [-1, 1], masks without demonstrations.
     pub fn new(demos: &Demos, config: &TrainConfig) -> Result<Self, PolicyError> {

@@ -29,14 +29,20 @@ use std::path::Path;
 /// Steps whose losses make one record.
 const RECORD_EVERY: usize = 50;
 
+/// What came of a training.
 #[derive(Clone, Debug, PartialEq)]
 pub struct TrainReport {
     /// Step from which the training went on; 0 = from the beginning.
     pub resumed_from: usize,
+    /// Steps taken, those before a resumption included.
     pub steps: usize,
+    /// How many numbers were learnt.
     pub parameters: usize,
+    /// Demonstrations to learn from.
     pub train_demos: usize,
+    /// Demonstrations to validate with.
     pub valid_demos: usize,
+    /// Windows to learn from.
     pub train_windows: usize,
     /// In the order of the steps; the last one is of the last iterate.
     pub history: Vec<LossRecord>,

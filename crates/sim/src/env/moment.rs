@@ -7,6 +7,7 @@ use mujoco_rs::prelude::*;
 /// All that the next step of physics reads: time, positions, velocities, actuation, controls, warm start, mocap bodies.
 const PHYSICS: u32 = MjtState::mjSTATE_INTEGRATION as u32;
 
+/// All that going on from one instant of an episode needs.
 #[derive(Clone, Debug)]
 pub struct Moment {
     physics: Box<[f64]>,

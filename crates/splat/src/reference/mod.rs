@@ -22,22 +22,31 @@ const TILE: usize = 16;
 /// Gaussians, how they are moved, and what is drawn besides colour.
 #[derive(Clone, Copy)]
 pub struct Scene<'a> {
+    /// What is drawn, in the canonical frame.
     pub gaussians: &'a Gaussians,
     /// Empty: everything at rest.
     pub groups: &'a [u16],
+    /// Pose of every group.
     pub world_from_group: &'a [Pose],
     /// (gaussians, channels)
     pub extra: &'a [f32],
+    /// Extra values of a gaussian; 0 when `extra` is empty.
     pub channels: usize,
 }
 
 /// A picture with what the backward pass needs. Planes are (h, w).
 pub struct Image {
+    /// What it was drawn with; (h, w) is its size.
     pub camera: Camera,
+    /// Colour behind the gaussians, rgb, 0..1.
     pub background: [Real; 3],
+    /// Red, green and blue, over the background.
     pub rgb: [Vec<Real>; 3],
+    /// Premultiplied depth: sum of w_i z_i, scene units.
     pub depth: Vec<Real>,
+    /// What is left of the light: 1 - alpha.
     pub transmittance: Vec<Real>,
+    /// Premultiplied extra values, one plane a channel.
     pub extra: Vec<Vec<Real>>,
     screen: Vec<Screen>,
     tiles: Vec<Vec<u32>>,
@@ -46,22 +55,35 @@ pub struct Image {
 /// dL/d pixel, planes like [`Image`].
 #[derive(Clone, Default)]
 pub struct PixelGradient {
+    /// By red, green and blue.
     pub rgb: [Vec<Real>; 3],
+    /// By the premultiplied depth.
     pub depth: Vec<Real>,
+    /// By alpha.
     pub alpha: Vec<Real>,
+    /// By the premultiplied extra values, one plane a channel.
     pub extra: Vec<Vec<Real>>,
 }
 
 /// Gradients in the order of [`Gaussians`]; twists as in [`crate::Gradients`].
 #[derive(Clone, Default)]
 pub struct SceneGradient {
+    /// By the centres. (n, 3)
     pub means: Vec<[Real; 3]>,
+    /// By the quaternions as they are, before they are normalised; w x y z. (n, 4)
     pub quats: Vec<[Real; 4]>,
+    /// By the logarithms of the standard deviations. (n, 3)
     pub scales: Vec<[Real; 3]>,
+    /// By the logits. (n)
     pub opacities: Vec<Real>,
+    /// By the coefficients of degree 0. (n, 3)
     pub sh0: Vec<[Real; 3]>,
+    /// By the coefficients of degree 1, basis y, z, x, each rgb; empty when the degree is 0. (n, 3,
+    /// 3)
     pub sh1: Vec<[[Real; 3]; 3]>,
+    /// By the extra values. (n, channels)
     pub extra: Vec<Vec<Real>>,
+    /// By the groups' poses, as twists (vx vy vz wx wy wz); one without groups.
     pub poses: Vec<[Real; 6]>,
 }
 

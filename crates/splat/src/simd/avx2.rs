@@ -6,6 +6,7 @@ use super::{EXP2_ROUND, LOG2_SERIES, Lanes};
 use core::arch::x86_64::*;
 use std::ops::{Add, Div, Mul, Sub};
 
+/// Eight lanes in one AVX register.
 #[derive(Clone, Copy)]
 pub struct Avx2(__m256);
 

@@ -6,6 +6,7 @@ use super::{LOG2_SERIES, Lanes};
 use core::arch::x86_64::*;
 use std::ops::{Add, Div, Mul, Sub};
 
+/// Sixteen lanes in one AVX-512 register.
 #[derive(Clone, Copy)]
 pub struct Avx512(__m512);
 

@@ -3,6 +3,7 @@
 use super::{EXP2_ROUND, LOG2_SERIES, Lanes};
 use std::ops::{Add, Div, Mul, Sub};
 
+/// Eight lanes in an array, for compilers to make of it what they can.
 #[derive(Clone, Copy)]
 #[repr(align(32))]
 pub struct Plain([f32; 8]);
