@@ -1,4 +1,34 @@
-//! The facade: stages, configuration, evaluation, reports and benches behind the `hingecast` binary.
+//! A cast of a thing, with its hinges: a recording of an articulated object becomes a twin that a simulator runs.
+//!
+//! The library behind the command line (`crates/cli`). It has no terminal: who calls it hands in a [`Watcher`], which hears of
+//! stages and may wish them to stop, and `threads` are those of a pool of its own.
+//!
+//! ```no_run
+//! use hingecast::{Config, Options, Preset, Silent, artifacts::TwinFile, build};
+//!
+//! // The recording must be there; the run folder is new, empty, or a run: then finished stages are kept.
+//! let config = Config::preset(Preset::Fast);
+//! let run = build("rec".as_ref(), "run".as_ref(), &config, &Options::default(), &Silent)?;
+//! for joint in &TwinFile::read(&run.root)?.tree.joints {
+//!     println!("{}: {:?} along {}", joint.name, joint.screw.kind, joint.screw.axis);
+//! }
+//! println!("doubts: {:?}", run.record.doubts);
+//! # Ok::<(), hingecast::Failure>(())
+//! ```
+//!
+//! | where | what |
+//! |---|---|
+//! | [`mod@build`] | the driver: stages in order, each kept while its stamp fits |
+//! | [`stages`] | one file a stage: plain data in, an artifact out |
+//! | [`artifacts`] | the files of a run, one struct, one reader and one writer each |
+//! | [`config`], [`overrides`] | settings; a person's corrections of joints |
+//! | [`eval`] | a run against the truth: the only code that opens a truth folder |
+//! | [`report`] | the page of a run |
+//!
+//! Parts and joints are found by `hingecast_articulate::find`, which can be called on depth images of your own:
+//! `examples/find_joints.rs`.
+
+#![warn(missing_docs)]
 
 pub mod artifacts;
 pub mod build;
@@ -13,3 +43,8 @@ pub mod report;
 pub mod stage;
 pub mod stages;
 pub mod watcher;
+
+pub use build::{Options, Stage, build};
+pub use config::{Config, Method, Preset};
+pub use failure::{Failure, Result};
+pub use watcher::{Silent, Watcher};
