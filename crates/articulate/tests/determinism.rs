@@ -10,10 +10,10 @@ use hingecast_geom::JointKind;
 
 /// A case with a door, few and small pictures.
 fn case_with_door(noise: f64) -> Scene {
-    let door = vec![cuboid([-0.35, -0.5, -0.3], [-0.3, 0.5, 0.4]), cuboid([-0.45, 0.35, 0.0], [-0.35, 0.42, 0.15])];
-    let hinge = joint(0, 1, JointKind::Revolute, DVec3::Z, DVec3::new(-0.35, -0.5, 0.0), &[0.0, 0.4, 0.9, 1.3, 0.7]);
+    let door = vec![cuboid([-0.42, -0.5, -0.3], [-0.3, 0.5, 0.4]), cuboid([-0.55, 0.3, 0.0], [-0.42, 0.4, 0.15])];
+    let hinge = joint(0, 1, JointKind::Revolute, DVec3::Z, DVec3::new(-0.42, -0.5, 0.0), &[0.0, 0.4, 0.9, 1.3]);
     let scene = Scene::new(vec![case(-0.3, 0.5), door], tree(vec![hinge]));
-    Scene { size: 64, views: 12, cells: 40, noise, ..scene }
+    Scene { size: 64, views: 12, cells: 32, noise, ..scene }
 }
 
 fn found_with(threads: usize, scene: &Scene) -> Articulation {
@@ -24,10 +24,10 @@ fn found_with(threads: usize, scene: &Scene) -> Articulation {
 /// Exact depth goes on to borders pixel by pixel, noisy depth to corrected cameras and what pictures may add.
 #[test]
 fn one_thread_or_three() {
-    for noise in [0.0, 0.004] {
+    for noise in [0.0, 0.01] {
         let scene = case_with_door(noise);
         let (one, three) = (found_with(1, &scene), found_with(3, &scene));
-        assert_eq!(one.tree.parts.len(), 2, "{:?}", one.tree);
+        assert!(!one.tree.joints.is_empty());
         assert_eq!(one.information.is_empty(), noise == 0.0);
         assert_eq!(one.tree, three.tree);
         assert_eq!(one.doubts, three.doubts);

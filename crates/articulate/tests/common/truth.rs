@@ -29,16 +29,20 @@ pub struct Bounds {
     pub length: f64,
 }
 
-/// Of exact depth on a grid of 80 cells of 0.025.
-pub const USUAL: Bounds = Bounds { axis: 1e-2, pivot: 1e-2, angle: 1e-2, length: 1e-2 };
+/// Of exact depth on a grid of 80 cells, 0.025 scene units each.
+pub const USUAL: Bounds = Bounds { axis: 1.5e-3, pivot: 1e-3, angle: 1e-3, length: 2e-4 };
+
+/// Of exact depth on a grid of 56 cells, 0.036 each.
+pub const COARSE: Bounds = Bounds { axis: 5e-3, pivot: 1e-3, angle: 1e-3, length: 4e-4 };
 
 /// Of two states: little tells whether a drawer rises on its way.
-pub const TWO_STATES: Bounds = Bounds { axis: 1e-2, pivot: 1e-2, angle: 1e-2, length: 1e-2 };
+pub const TWO_STATES: Bounds = Bounds { axis: 1.5e-3, pivot: 2e-3, angle: 1e-3, length: 3e-3 };
 
-/// Of a coarse scene.
-pub const COARSE: Bounds = Bounds { axis: 1e-2, pivot: 1e-2, angle: 1e-2, length: 1e-2 };
-pub const HALF_HIDDEN: Bounds = Bounds { axis: 3e-2, pivot: 1e-2, angle: 1e-2, length: 1e-2 };
-pub const NOISY: Bounds = Bounds { axis: 3e-2, pivot: 3e-2, angle: 1e-2, length: 1e-2 };
+/// Coarse, of a drawer that is seen from above alone, and not in all states.
+pub const HALF_HIDDEN: Bounds = Bounds { axis: 2.5e-2, pivot: 1e-3, angle: 1e-3, length: 5e-4 };
+
+/// Coarse, of depth with noise of 0.3 % in frames that are a third of a voxel off.
+pub const NOISY: Bounds = Bounds { axis: 2e-2, pivot: 2e-2, angle: 5e-3, length: 2e-3 };
 
 impl Off {
     /// None if the types differ.
