@@ -17,7 +17,8 @@ fn two_boxes() -> Scene {
     Scene::new(boxes, tree(vec![slide(1, DVec3::X, &[0.0, 0.4, -0.4, -0.8])])).coarse()
 }
 
-/// Of all samples on the box of a part, the share where a known part claims [`TAKEN`], and the share where it claims anything.
+/// Of all samples on the box of a part, the share where a known part claims [`TAKEN`], and the
+/// share where it claims anything.
 fn claimed(scene: &Scene, evidence: &Evidence, claims: &Claims, part: usize) -> [f64; 2] {
     let (mut taken, mut any, mut all) = (0, 0, 0);
     for s in &evidence.samples {

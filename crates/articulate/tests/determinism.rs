@@ -21,7 +21,8 @@ fn found_with(threads: usize, scene: &Scene) -> Articulation {
     pool.install(|| scene.find())
 }
 
-/// Exact depth goes on to borders pixel by pixel, noisy depth to corrected cameras and what pictures may add.
+/// Exact depth goes on to borders pixel by pixel, noisy depth to corrected cameras and what
+/// pictures may add.
 #[test]
 fn one_thread_or_three() {
     for noise in [0.0, 0.01] {

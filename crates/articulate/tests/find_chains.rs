@@ -24,7 +24,8 @@ fn a_joint_on_a_joint() {
     assert_tree(&scene.find().tree, &scene, &USUAL);
 }
 
-/// A turn and a slide along its axis commute: the seat does not know which comes first, the lever that only rises does.
+/// A turn and a slide along its axis commute: the seat does not know which comes first, the lever
+/// that only rises does.
 #[test]
 fn a_seat_that_rises_and_then_turns() {
     let scene = swivel_seat().coarse();

@@ -1,4 +1,5 @@
-//! `find` where the grid alone is wrong: parts a fraction of a voxel apart, motions that are nearly alike, parts that are hidden.
+//! `find` where the grid alone is wrong: parts a fraction of a voxel apart, motions that are nearly
+//! alike, parts that are hidden.
 
 mod common;
 
@@ -9,7 +10,8 @@ use glam::DVec3;
 use hingecast_articulate::Doubt;
 use hingecast_geom::JointKind;
 
-/// A blade lies on another, half a voxel higher: the grid alone gives the rim of the one to the other.
+/// A blade lies on another, half a voxel higher: the grid alone gives the rim of the one to the
+/// other.
 #[test]
 fn blades_a_fraction_of_a_voxel_apart() {
     let tops = [0.06, 0.072];
@@ -25,8 +27,8 @@ fn blades_a_fraction_of_a_voxel_apart() {
     // Wrong and all samples: farther than a voxel from the upper blade's rim, and nearer.
     let mut counts = [(0, 0); 2];
     for s in &found.samples {
-        // Around the pivot both turn in their own plane. Low on the rim of the upper blade a sample is as high as the lower one's
-        // top.
+        // Around the pivot both turn in their own plane. Low on the rim of the upper blade a sample
+        // is as high as the lower one's top.
         let on_upper = scene.tree.poses_at(s.state)[1].inverse().apply(s.point.as_dvec3());
         let outside = (on_upper.y.abs() - 0.12).max((on_upper.x - 0.2).abs() - 0.7);
         if s.point.truncate().length() < 0.17 || outside.abs() < 0.005 {
@@ -42,7 +44,8 @@ fn blades_a_fraction_of_a_voxel_apart() {
     assert!(far > 3000 && far_wrong * 200 < far && near > 3000 && near_wrong * 5 < near, "{counts:?}");
 }
 
-/// The fronts are nearly one long board in most states: a slide that carries one onto the other explains nearly everything.
+/// The fronts are nearly one long board in most states: a slide that carries one onto the other
+/// explains nearly everything.
 #[test]
 fn a_slide_found_askew_is_turned() {
     let scene = drawers_open_by(&[[0.0, 0.3, 0.4, 0.36, 0.2], [0.0, 0.1, 0.38, 0.385, 0.22]]);

@@ -14,7 +14,8 @@ fn a_door_and_a_drawer() {
     let scene = cupboard_open_by(&[0.0, 0.5, 1.2, 1.2, 0.9], &[0.0, 0.0, 0.1, 0.3, 0.45]);
     let found = scene.find();
     let names = assert_tree(&found.tree, &scene, &USUAL);
-    // The walls of the drawer slide in their own planes, and its floor stays in its plane when it turns with the door.
+    // The walls of the drawer slide in their own planes, and its floor stays in its plane when it
+    // turns with the door.
     let right = labelled_right(&found, &scene, &names);
     assert!(right > 0.99, "{right}");
     assert!(found.doubts.is_empty(), "{:?}", found.doubts);
@@ -26,7 +27,8 @@ fn a_door_and_a_drawer_in_two_states() {
     assert_tree(&scene.find().tree, &scene, &TWO_STATES);
 }
 
-/// Three equal drawers, opened one after another and left open: what disappears from one place appears where another was.
+/// Three equal drawers, opened one after another and left open: what disappears from one place
+/// appears where another was.
 #[test]
 fn equal_drawers_one_after_another() {
     let mut boxes = vec![vec![

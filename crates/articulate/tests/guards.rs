@@ -33,7 +33,8 @@ fn walls(n_states: usize) -> Vec<Vec<DepthView>> {
     vec![vec![wall(); 2]; n_states]
 }
 
-/// Fails as [`ArticulateError::Input`] with these words in what is wrong and where, and with something to try.
+/// Fails as [`ArticulateError::Input`] with these words in what is wrong and where, and with
+/// something to try.
 fn assert_refused(depths: &mut dyn Depths, config: &Config, what_says: &str, place_says: &str) {
     match find(depths, config, &Progress::default()) {
         Err(ArticulateError::Input { what, place, hint }) => {
@@ -46,7 +47,8 @@ fn assert_refused(depths: &mut dyn Depths, config: &Config, what_says: &str, pla
     }
 }
 
-/// The second view of the second state is spoilt: refused from memory, and from elsewhere, where the extent is known without it.
+/// The second view of the second state is spoilt: refused from memory, and from elsewhere, where
+/// the extent is known without it.
 fn assert_view_refused(spoil: impl Fn(&mut DepthView), what_says: &str, place_says: &str) {
     let mut states = walls(3);
     spoil(&mut states[1][1]);

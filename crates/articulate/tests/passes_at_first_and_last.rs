@@ -1,4 +1,5 @@
-//! What each optional pass that runs once is worth: from a tree that is wrong by hand, all passes get it right, and all but that one do not.
+//! What each optional pass that runs once is worth: from a tree that is wrong by hand, all passes
+//! get it right, and all but that one do not.
 
 mod common;
 
@@ -14,7 +15,8 @@ fn cupboard() -> Scene {
     cupboard_open_by(&[0.0, 0.5, 1.2, 1.2, 0.9], &[0.0, 0.0, 0.1, 0.3, 0.45]).coarse()
 }
 
-/// The search knew two of five values of the drawer. Later passes only look around values, or at states that hide a part.
+/// The search knew two of five values of the drawer. Later passes only look around values, or at
+/// states that hide a part.
 #[test]
 fn ask_values() {
     let scene = cupboard();

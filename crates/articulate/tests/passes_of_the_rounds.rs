@@ -1,4 +1,5 @@
-//! What each optional pass of the rounds is worth: from a tree that is wrong by hand, all passes get it right, and all but that one do not.
+//! What each optional pass of the rounds is worth: from a tree that is wrong by hand, all passes
+//! get it right, and all but that one do not.
 
 mod common;
 
@@ -65,7 +66,8 @@ fn align_states() {
     assert!(off(&without, &scene, 0).pivot > 3.0 * off(&with, &scene, 0).pivot);
 }
 
-/// A value is beside the right one, farther than Gauss-Newton reaches. Mostly `ask_values` has brought it back before.
+/// A value is beside the right one, farther than Gauss-Newton reaches. Mostly `ask_values` has
+/// brought it back before.
 #[test]
 fn search_values() {
     let scene = door_and_drawer();
@@ -76,8 +78,9 @@ fn search_values() {
     assert!(off(&without, &scene, 1).value > scene.voxel());
 }
 
-/// Two drawers side by side, open nearly as far as each other: the front of one is a voxel or two beside where the other's would be.
-/// A value that is off by so much is brought back, and right ones stay.
+/// Two drawers side by side, open nearly as far as each other: the front of one is a voxel or two
+/// beside where the other's would be. A value that is off by so much is brought back, and right
+/// ones stay.
 #[test]
 fn a_value_beside_the_right_one() {
     let scene = drawers_open_by(&[[0.0, 0.316, 0.384, 0.353, 0.211], [0.0, 0.018, 0.345, 0.384, 0.384]]);
@@ -124,7 +127,8 @@ fn align_axes() {
     assert!(off(&settled(&scene, &tree, &["align_axes"]), &scene, 1).axis > 3.0 * TWO_STATES.axis);
 }
 
-/// The drawer's values are off by most of a voxel, to and fro: the one behind the door is that of a state which is corrected later.
+/// The drawer's values are off by most of a voxel, to and fro: the one behind the door is that of a
+/// state which is corrected later.
 #[test]
 fn hold_hidden() {
     let scene = drawer_behind_door().coarse();

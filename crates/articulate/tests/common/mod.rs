@@ -1,4 +1,5 @@
-//! Scenes of boxes whose depth is computed exactly, and what is asserted of the joints found in them.
+//! Scenes of boxes whose depth is computed exactly, and what is asserted of the joints found in
+//! them.
 
 #![allow(dead_code)] // Each test file uses its own share.
 

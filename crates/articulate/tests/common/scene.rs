@@ -29,7 +29,7 @@ pub struct Scene {
     pub cells: usize,
     /// Standard deviation of a depth over that depth.
     pub noise: f64,
-    /// What the cameras of a state believe where the world is: moved by this, per state; empty: the truth.
+    /// Where the cameras of a state believe that the world is, per state; empty: where it is.
     pub believed_from_world: Vec<Pose>,
 }
 

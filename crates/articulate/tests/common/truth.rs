@@ -12,7 +12,8 @@ pub struct Off {
     pub axis: f64,
     /// Distance of the found pivot from the true line, scene units; 0 for a slide.
     pub pivot: f64,
-    /// Largest error of a value, counted from the first state: radians for a hinge, scene units for a slide.
+    /// Largest error of a value, counted from the first state: radians for a hinge, scene units for
+    /// a slide.
     pub value: f64,
 }
 
@@ -85,7 +86,8 @@ pub fn assert_joint(tree: &KinematicTree, truth: &Joint, most: &Bounds) -> usize
     k
 }
 
-/// The same number of parts as in truth, and each joint within bounds on the right parent. `[k]`: the found part that is the true part k.
+/// The same number of parts as in truth, and each joint within bounds on the right parent. `[k]`:
+/// the found part that is the true part k.
 pub fn assert_tree(tree: &KinematicTree, scene: &Scene, most: &Bounds) -> Vec<usize> {
     assert_eq!(tree.parts.len(), scene.boxes.len(), "{tree:?}");
     let mut names = vec![0; scene.boxes.len()];
@@ -103,7 +105,8 @@ pub fn assert_tree(tree: &KinematicTree, scene: &Scene, most: &Bounds) -> Vec<us
     names
 }
 
-/// Share of the samples whose part is the one whose boxes they lie on. `names[k]`: the found part that is the true part k.
+/// Share of the samples whose part is the one whose boxes they lie on. `names[k]`: the found part
+/// that is the true part k.
 pub fn labelled_right(found: &Articulation, scene: &Scene, names: &[usize]) -> f64 {
     let (mut right, mut clear) = (0, 0);
     for s in &found.samples {
