@@ -46,9 +46,9 @@ fn equal_drawers_one_after_another() {
         ]);
     }
     let ramp = |from: usize, far: f64| -> Vec<f64> {
-        (0..13).map(|s: usize| far * s.saturating_sub(from).min(4) as f64 / 4.0).collect()
+        (0..10).map(|s: usize| far * s.saturating_sub(from).min(3) as f64 / 3.0).collect()
     };
-    let drawer = |k: usize| slide(k, DVec3::NEG_X, &ramp(4 * (k - 1), [0.5, 0.45, 0.55][k - 1]));
+    let drawer = |k: usize| slide(k, DVec3::NEG_X, &ramp(3 * (k - 1), [0.5, 0.45, 0.55][k - 1]));
     let scene = Scene::new(boxes, tree((1..4).map(drawer).collect())).coarse();
     assert_tree(&scene.find().tree, &scene, &COARSE);
 }

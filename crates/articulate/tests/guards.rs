@@ -92,6 +92,7 @@ fn a_camera_pose_that_is_not_finite() {
     assert_view_refused(|v| v.camera.camera_from_world.rot.w = bad, "camera pose", "state 1, view 1");
 }
 
+/// Views in memory used to panic here, when their extent was asked for.
 #[test]
 fn wrong_sizes() {
     assert_view_refused(|v| v.depth.truncate(300), "300 depths and 384 classes for 384 pixels", "state 1, view 1");
