@@ -28,6 +28,9 @@ impl Depths for Vec<Vec<DepthView>> {
     }
 
     fn extent(&mut self) -> Result<(Vec3, Vec3), DepthError> {
+        for (state, views) in self.iter().enumerate() {
+            check_views(views, state)?;
+        }
         let (mut lo, mut hi) = (Vec3::INFINITY, Vec3::NEG_INFINITY);
         for view in self.iter().flatten() {
             let w = view.camera.width;

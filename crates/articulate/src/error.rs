@@ -29,4 +29,9 @@ impl ArticulateError {
     pub fn input(what: impl Into<String>, place: impl Into<String>, hint: impl Into<String>) -> Self {
         Self::Input { what: what.into(), place: place.into(), hint: hint.into() }
     }
+
+    /// What a [`Depths`](crate::Depths) failed with: one of these, or something of its own.
+    pub(crate) fn of_depths(error: DepthError) -> Self {
+        error.downcast::<Self>().map_or_else(Self::Depths, |own| *own)
+    }
 }

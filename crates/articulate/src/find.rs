@@ -54,9 +54,9 @@ pub struct Articulation {
 /// use hingecast_articulate::{Config, DepthView, find};
 /// use hingecast_geom::{Camera, Progress};
 ///
-/// // Depth of a lid, [-1, 1] x [-0.6, 0.6] x [0, 0.1], that slides along x over a table at z = 0; in every state 12 views.
+/// // Depth of a box, [-1, 1] x [-0.6, 0.6] x [0, 0.5], that slides along x over a table at z = 0; in every state 12 views.
 /// let z_at = |eye: DVec3, ray: DVec3, x: f64| {
-///     let (lo, hi) = (DVec3::new(x - 1.0, -0.6, 0.0), DVec3::new(x + 1.0, 0.6, 0.1));
+///     let (lo, hi) = (DVec3::new(x - 1.0, -0.6, 0.0), DVec3::new(x + 1.0, 0.6, 0.5));
 ///     let (a, b) = ((lo - eye) / ray, (hi - eye) / ray);
 ///     let (enter, leave) = (a.min(b).max_element(), a.max(b).min_element());
 ///     let table = -eye.z / ray.z;
@@ -77,9 +77,9 @@ pub struct Articulation {
 /// let mut states: Vec<Vec<_>> = [-0.8, -0.5, 0.1, 0.6, 0.8].map(|x| (0..12).map(|k| view(k, x)).collect()).to_vec();
 ///
 /// let found = find(&mut states, &Config { cells: 48, ..Config::default() }, &Progress::default())?;
-/// let lid = &found.tree.joints[0];
-/// assert!(!lid.screw.kind.turns() && lid.screw.axis.x.abs() > 0.999);
-/// assert!((lid.values[4].abs() - 1.6).abs() < 0.02, "{:?}", lid.values);
+/// let slide = &found.tree.joints[0];
+/// assert!(!slide.screw.kind.turns() && slide.screw.axis.x.abs() > 0.999);
+/// assert!((slide.values[4].abs() - 1.6).abs() < 0.02, "{:?}", slide.values);
 /// # Ok::<(), hingecast_articulate::ArticulateError>(())
 /// ```
 pub fn find(depths: &mut dyn Depths, config: &Config, progress: &Progress) -> Result<Articulation, ArticulateError> {
@@ -91,7 +91,7 @@ pub fn find(depths: &mut dyn Depths, config: &Config, progress: &Progress) -> Re
         lattice,
         &mut |state| {
             progress.report(state, n_states, "surface and space")?;
-            let mut views = depths.views(state).map_err(ArticulateError::Depths)?;
+            let mut views = depths.views(state).map_err(ArticulateError::of_depths)?;
             check_views(&views, state)?;
             if config.align_cameras {
                 cameras::align(&mut views, lattice.voxel);
@@ -168,7 +168,7 @@ fn correct(world_from_state: &[Pose], cameras: &mut [Vec<Pose>]) {
 
 /// The views of a state from where their cameras are.
 fn corrected(depths: &mut dyn Depths, state: usize, cameras: &[Pose]) -> Result<Vec<DepthView>, ArticulateError> {
-    let mut views = depths.views(state).map_err(ArticulateError::Depths)?;
+    let mut views = depths.views(state).map_err(ArticulateError::of_depths)?;
     views.iter_mut().zip(cameras).for_each(|(view, pose)| view.camera.camera_from_world = *pose);
     Ok(views)
 }
@@ -193,7 +193,7 @@ fn checked_lattice(depths: &mut dyn Depths, config: &Config) -> Result<Lattice, 
         let what = format!("no pass '{name}' that could be left out");
         return Err(ArticulateError::input(what, "passes.skip", format!("one of {}", names.join(", "))));
     }
-    let (lo, hi) = depths.extent().map_err(ArticulateError::Depths)?;
+    let (lo, hi) = depths.extent().map_err(ArticulateError::of_depths)?;
     let size = hi - lo;
     if !(lo.is_finite() && hi.is_finite() && size.min_element() >= 0.0 && size.max_element() > 0.0) {
         let hint = "is the depth in scene units, and does any pixel show the object?";
