@@ -117,7 +117,7 @@ fn build_with(
     folder.record.threads = threads;
     let text = toml::to_string_pretty(config).expect("a config is a table");
     let path = run.join("config.toml");
-    hingecast_geom::ply::write_whole(&path, text.as_bytes()).map_err(Failure::io(&path))?;
+    hingecast_geom::staging::write_whole(&path, text.as_bytes()).map_err(Failure::io(&path))?;
 
     let cache = ViewCache::new(&recording, config.memory_mb << 20);
     let background = targets::background(&recording, &cache)?;

@@ -5,7 +5,7 @@
 
 use crate::failure::{Failure, Result};
 use hingecast_geom::folder::may_become;
-use hingecast_geom::ply::write_whole;
+use hingecast_geom::staging::write_whole;
 use serde::{Deserialize, Serialize};
 use std::path::{Path, PathBuf};
 

@@ -94,7 +94,7 @@ pub fn write(run: &RunFolder) -> Result<PathBuf> {
     let content = Content { twin, overlays, held_out, plot };
     let path = folder.join("index.html");
     let text = html::page(run, &content);
-    hingecast_geom::ply::write_whole(&path, text.as_bytes()).map_err(Failure::io(&path))?;
+    hingecast_geom::staging::write_whole(&path, text.as_bytes()).map_err(Failure::io(&path))?;
     Ok(path)
 }
 

@@ -8,7 +8,7 @@ use hingecast::simulate::teleop::session::Session as TeleopSession;
 use hingecast::simulate::teleop::terminal::{self, Console};
 use hingecast::simulate::teleop::{self, Wanted};
 use hingecast::simulate::{may_write, object_file, replay, twin_file};
-use hingecast_geom::ply::write_whole;
+use hingecast_geom::staging::write_whole;
 use hingecast_policy::demos::{read, write};
 use hingecast_sim::trial::make_task;
 use hingecast_sim::{Scene, SceneConfig, TaskKind, TaskSpec};

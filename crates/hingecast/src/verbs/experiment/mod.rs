@@ -11,7 +11,7 @@ use hingecast::experiment::steps::{Clock, Ledger, Steps};
 use hingecast::experiment::{Experiment, plot, table};
 use hingecast::failure::{Failure, Result};
 use hingecast::stage::write_json;
-use hingecast_geom::ply::write_whole;
+use hingecast_geom::staging::write_whole;
 use plan::Plan;
 use std::path::Path;
 
