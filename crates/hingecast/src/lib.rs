@@ -11,6 +11,7 @@ pub mod failure;
 pub mod import_object;
 pub mod overrides;
 pub mod report;
+pub mod run_files;
 #[cfg(feature = "mujoco")]
 pub mod simulate;
 pub mod stage;

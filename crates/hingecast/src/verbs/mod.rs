@@ -53,7 +53,7 @@ impl Session {
 }
 
 pub fn run(cli: &Cli) -> Result<Outcome> {
-    let threads = cli.threads.unwrap_or_else(|| std::thread::available_parallelism().map_or(2, |n| n.get())).max(1);
+    let threads = hingecast::build::threads(cli.threads.unwrap_or(0))?;
     // Fails only when a pool is there already: then that one serves.
     let _ = rayon::ThreadPoolBuilder::new().num_threads(threads).build_global();
     let session = Session { ui: Ui::new(cli.quiet), json: cli.json, threads };
