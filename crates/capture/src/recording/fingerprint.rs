@@ -49,8 +49,7 @@ mod tests {
     fn every_byte_of_every_file_counts() {
         let dir = tempfile::tempdir().unwrap();
         let eye = [[1.0, 0.0, 0.0, 0.0], [0.0, 1.0, 0.0, 0.0], [0.0, 0.0, 1.0, 0.0], [0.0, 0.0, 0.0, 1.0]];
-        let frame =
-            json!({ "file_path": "a.jpg", "depth_file_path": "a.npy", "mask_path": "a.png", "transform_matrix": eye });
+        let frame = json!({ "file_path": "a.jpg", "state": 0, "depth_file_path": "a.npy", "mask_path": "a.png", "transform_matrix": eye });
         let top = json!({ "w": 8, "h": 8, "fl_x": 8.0, "fl_y": 8.0, "cx": 4.0, "cy": 4.0, "frames": [frame] });
         fs::write(dir.path().join("transforms.json"), top.to_string()).unwrap();
         let files = ["a.jpg", "a.npy", "a.png"].map(|name| dir.path().join(name));

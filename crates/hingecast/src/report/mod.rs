@@ -46,6 +46,8 @@ pub fn write(run: &RunFolder) -> Result<PathBuf> {
     let recording = Recording::open(&run.record.recording)?;
     let Splats { gaussians, extent, .. } = Splats::read(&run.root)?;
     let found = Joints::read(&run.root)?;
+    found.fit(&run.root, recording.n_states, gaussians.len())?;
+    twin.fits(&run.root, recording.n_states, &found.tree)?;
     let cache = ViewCache::new(&recording, 64 << 20);
     let background = targets::background(&recording, &cache)?;
     let mut labeller = Labeller::new(&gaussians, &found.labels, run.record.threads.max(1))?;

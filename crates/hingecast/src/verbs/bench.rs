@@ -30,7 +30,7 @@ pub fn run(session: &Session, args: &Bench) -> Result<Outcome> {
             }
             Err(failure) if failure.cancelled => return Err(failure),
             // One broken object must not hide the others' figures.
-            Err(failure) => eprintln!("error: {failure}"),
+            Err(failure) => session.ui.complain(&failure),
         }
         if args.tidy {
             let _ = std::fs::remove_dir_all(&recording);
@@ -41,7 +41,7 @@ pub fn run(session: &Session, args: &Bench) -> Result<Outcome> {
     write_json(&args.out.join("bench.json"), &evaluations)?;
     let path = args.out.join("bench.md");
     std::fs::write(&path, &text).map_err(Failure::io(&path))?;
-    session.answer(&evaluations);
+    session.answer(&evaluations)?;
     let mut outcome = if evaluations.len() < suite.len() { Outcome::UnderBar } else { Outcome::Done };
     if let Some(before) = &before {
         let worse = compare(before, &evaluations);

@@ -63,7 +63,7 @@ pub fn run(session: &Session, args: &Bench, suite: &[Named]) -> Result<Outcome> 
                     }
                     Err(failure) if failure.cancelled => return Err(failure),
                     // One broken object must not hide the others' figures.
-                    Err(failure) => eprintln!("error: {failure}"),
+                    Err(failure) => session.ui.complain(&failure),
                 }
             }
         }
@@ -75,7 +75,7 @@ pub fn run(session: &Session, args: &Bench, suite: &[Named]) -> Result<Outcome> 
     write_json(&args.out.join("joints.json"), &rows)?;
     let path = args.out.join("joints.md");
     std::fs::write(&path, &text).map_err(Failure::io(&path))?;
-    session.answer(&rows);
+    session.answer(&rows)?;
     Ok(Outcome::Done)
 }
 

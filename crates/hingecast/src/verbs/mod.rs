@@ -22,7 +22,7 @@ mod train;
 
 use crate::cli::{Cli, Verb};
 use hingecast::failure::Result;
-use hingecast::ui::Ui;
+use hingecast::ui::{Ui, answer};
 use hingecast::{report, stage::RunFolder};
 
 pub enum Outcome {
@@ -45,10 +45,11 @@ impl Session {
     }
 
     /// The machine's answer, when it was asked for.
-    pub fn answer(&self, value: &impl serde::Serialize) {
-        if self.json {
-            println!("{}", serde_json::to_string(value).expect("plain data"));
-        }
+    ///
+    /// # Errors
+    /// It cannot be written.
+    pub fn answer(&self, value: &impl serde::Serialize) -> Result<()> {
+        if self.json { answer(&serde_json::to_string(value).expect("plain data")) } else { Ok(()) }
     }
 }
 
@@ -69,7 +70,7 @@ pub fn run(cli: &Cli) -> Result<Outcome> {
         Verb::Report(args) => {
             let path = report::write(&RunFolder::open(&args.run)?)?;
             session.ui.say(&format!("report: {}", path.display()));
-            session.answer(&serde_json::json!({ "report": path }));
+            session.answer(&serde_json::json!({ "report": path }))?;
             Ok(Outcome::Done)
         }
         #[cfg(feature = "mujoco")]

@@ -133,7 +133,7 @@ impl Cast<'_> {
             Ok(value) => Ok(Ok(value)),
             Err(failure) if failure.cancelled => Err(failure),
             Err(failure) => {
-                eprintln!("error: {failure}");
+                self.session.ui.complain(&failure);
                 Ok(Err(failure.what))
             }
         }

@@ -36,7 +36,7 @@ pub fn run(session: &Session, args: &cli::Experiment) -> Result<Outcome> {
     }
     session.ui.say(&format!("\n{}", table::markdown(&experiment)));
     session.ui.say(&format!("table and plot: {}", args.out.join("experiment.{md,csv,json,svg}").display()));
-    session.answer(&experiment);
+    session.answer(&experiment)?;
     let measured = experiment.rows.iter().any(|r| r.failed.is_none());
     Ok(if measured { Outcome::Done } else { Outcome::UnderBar })
 }
