@@ -41,7 +41,7 @@ pub struct Cli {
     /// Nothing on stderr but errors, not even the answer: that comes with --json.
     #[arg(long, short, global = true)]
     pub quiet: bool,
-    /// Worker threads, 1 or more [default: all cores]. The results do not depend on it.
+    /// Worker threads, 1 to 256, or to 4 per core if that is more [default: all cores]. The results do not depend on it.
     #[arg(long, global = true, value_name = "N", value_parser = at_least_one)]
     pub threads: Option<usize>,
 }

@@ -4,10 +4,10 @@ mod cli;
 mod ui;
 mod verbs;
 
+use crate::ui::{answer, tell};
 use clap::Parser;
 use clap::error::{ContextKind, ErrorKind};
 use hingecast::failure::Failure;
-use std::io::Write;
 use std::process::ExitCode;
 
 fn main() -> ExitCode {
@@ -27,10 +27,10 @@ fn main() -> ExitCode {
 fn refuse(failure: &Failure, json: bool) -> ExitCode {
     if json {
         let error = serde_json::json!({"error": failure.what, "where": failure.place, "try": failure.hint});
-        println!("{error}");
+        // The exit code says already that it went wrong.
+        let _ = answer(&error.to_string());
     }
-    // Nobody may be left to read it: a terminal that was closed.
-    let _ = writeln!(std::io::stderr(), "{}: {failure}", if failure.cancelled { "stopped" } else { "error" });
+    tell(&format!("{}: {failure}", if failure.cancelled { "stopped" } else { "error" }));
     ExitCode::from(if failure.cancelled { 130 } else { 2 })
 }
 

@@ -1,16 +1,38 @@
 //! What a person sees while a stage runs: a bar with ETA on a terminal, a line now and then elsewhere.
-//! Everything human goes to stderr; stdout is for `--json`.
+//! Everything human goes to stderr; stdout is for `--json`. Nobody else writes there: `println!` and `eprintln!` panic when the reader
+//! has gone, which is nothing to lose a build of an hour for.
 
+use hingecast::failure::{Failure, Result};
 use hingecast::watcher::Watcher;
 use hingecast_geom::Progress;
 use indicatif::{ProgressBar, ProgressStyle};
-use std::io::IsTerminal;
+use std::io::{ErrorKind, IsTerminal, Write};
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex};
 use std::time::{Duration, Instant};
 
 /// Lines in a log file: often enough to see that it lives, seldom enough to read.
 const LINE_EVERY: Duration = Duration::from_secs(10);
+
+/// A line for people. Where nobody reads any more, the work goes on.
+pub fn tell(text: &str) {
+    let _ = writeln!(std::io::stderr().lock(), "{text}");
+}
+
+/// The machine's answer, one line. A reader that has gone wants none.
+///
+/// # Errors
+/// It cannot be written: a full disk behind `>`.
+pub fn answer(text: &str) -> Result<()> {
+    let mut out = std::io::stdout().lock();
+    match writeln!(out, "{text}").and_then(|()| out.flush()) {
+        Err(e) if e.kind() != ErrorKind::BrokenPipe => {
+            let hint = "free some disk space, or send the answer elsewhere";
+            Err(Failure::new(format!("the answer cannot be written: {e}"), "stdout", hint))
+        }
+        _ => Ok(()),
+    }
+}
 
 #[derive(Clone)]
 pub struct Ui {
@@ -28,7 +50,7 @@ impl Ui {
             if flag.swap(true, Ordering::Relaxed) {
                 std::process::exit(130);
             }
-            eprintln!("\nstopping at the next safe point (Ctrl-C again to kill) ...");
+            tell("\nstopping at the next safe point (Ctrl-C again to kill) ...");
         });
         Self { cancel, quiet }
     }
@@ -36,8 +58,13 @@ impl Ui {
     /// A line for people.
     pub fn say(&self, text: &str) {
         if !self.quiet {
-            eprintln!("{text}");
+            tell(text);
         }
+    }
+
+    /// Something failed and the work goes on; also said with --quiet.
+    pub fn complain(&self, failure: &Failure) {
+        tell(&format!("error: {failure}"));
     }
 
     /// A progress handle for the stage `name`; the bar goes when the handle is dropped.
@@ -70,10 +97,8 @@ impl Ui {
                     *last = Instant::now();
                     let spent = start.elapsed().as_secs_f64();
                     let eta = spent * (total as f64 / done as f64 - 1.0);
-                    eprintln!(
-                        "{name:<7} {:>3.0} %  {spent:.0} s, eta {eta:.0} s  {note}",
-                        100.0 * done as f64 / total as f64
-                    );
+                    let percent = 100.0 * done as f64 / total as f64;
+                    tell(&format!("{name:<7} {percent:>3.0} %  {spent:.0} s, eta {eta:.0} s  {note}"));
                 }
             },
             cancel,
@@ -88,5 +113,9 @@ impl Watcher for Ui {
 
     fn say(&self, line: &str) {
         self.say(line);
+    }
+
+    fn complain(&self, failure: &Failure) {
+        self.complain(failure);
     }
 }

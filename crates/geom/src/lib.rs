@@ -38,6 +38,7 @@ pub mod ply;
 pub mod pose;
 pub mod progress;
 pub mod random;
+pub mod staging;
 pub mod tree;
 
 pub use camera::{Camera, Projection};

@@ -1,7 +1,8 @@
 //! Meshes in and out: PLY (vertex colours), OBJ (vertex colours after the position, as MeshLab writes them), binary STL.
 
 use crate::TriMesh;
-use crate::ply::{self, PlyError, write_whole};
+use crate::ply::{self, PlyError};
+use crate::staging::write_whole;
 use glam::Vec3;
 use std::fmt::Write as _;
 use std::path::Path;

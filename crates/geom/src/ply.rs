@@ -1,7 +1,7 @@
 //! Just enough PLY: a table of scalar vertex properties in, float tables and coloured meshes out.
 //! Binary little-endian and ascii are read; binary little-endian is written.
 
-use std::io::Write;
+use crate::staging::write_whole;
 use std::path::{Path, PathBuf};
 
 /// Why a PLY file could not be read or written.
@@ -256,18 +256,4 @@ pub fn write_float_vertices(path: &Path, names: &[String], data: &[f32]) -> Resu
         out.extend(value.to_le_bytes());
     }
     write_whole(path, &out).map_err(io_error(path))
-}
-
-/// Writes `bytes` under a temporary name and renames: a reader never sees half a file.
-///
-/// # Errors
-/// The temporary file cannot be written beside `path`, or not be renamed.
-pub fn write_whole(path: &Path, bytes: &[u8]) -> std::io::Result<()> {
-    let mut name = path.file_name().unwrap_or_default().to_os_string();
-    name.push(".tmp");
-    let temporary = path.with_file_name(name);
-    let mut file = std::fs::File::create(&temporary)?;
-    file.write_all(bytes)?;
-    drop(file);
-    std::fs::rename(&temporary, path)
 }

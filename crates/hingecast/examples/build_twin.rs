@@ -10,13 +10,8 @@ use std::path::Path;
 fn main() -> hingecast::Result<()> {
     let mut args = std::env::args().skip(1);
     let (recording, run) = (args.next().unwrap_or("rec".into()), args.next().unwrap_or("run".into()));
-    let folder = build(
-        Path::new(&recording),
-        Path::new(&run),
-        &Config::preset(Preset::Fast),
-        &Options::default(),
-        &Silent,
-    )?;
+    let folder =
+        build(Path::new(&recording), Path::new(&run), &Config::preset(Preset::Fast), &Options::default(), &Silent)?;
     let twin = TwinFile::read(&folder.root)?;
     for joint in &twin.tree.joints {
         let carries = &twin.tree.parts[joint.child];

@@ -3,6 +3,7 @@
 use crate::artifacts::{Made, samples};
 use crate::config::{Config, Method};
 use crate::failure::{Failure, Result};
+use crate::run_files::RunLock;
 use crate::stage::{RunFolder, erased, stamp};
 use crate::stages::inputs::Inputs;
 use crate::stages::{self, classical, targets};
@@ -62,6 +63,9 @@ impl Stage {
     }
 }
 
+/// Also on small machines: scripts that were written on large ones shall run.
+const MOST_THREADS: usize = 256;
+
 /// Which stages to run, and on how much of the machine.
 #[derive(Clone, Debug, Default)]
 pub struct Options {
@@ -69,7 +73,7 @@ pub struct Options {
     pub from: Option<Stage>,
     /// Last stage to run; all if `None`.
     pub to: Option<Stage>,
-    /// Throw an existing run away first.
+    /// Throw what an existing run has made away first.
     pub fresh: bool,
     /// Worker threads of this build, in a pool of its own; 0 = as many as the machine has cores. The results do not depend on it.
     pub threads: usize,
@@ -86,15 +90,26 @@ pub fn build(
     options: &Options,
     watcher: &dyn Watcher,
 ) -> Result<RunFolder> {
-    let threads = match options.threads {
-        0 => std::thread::available_parallelism().map_or(2, |n| n.get()),
-        n => n,
-    };
+    let threads = threads(options.threads)?;
     let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().map_err(|e| {
         let hint = "fewer threads: the machine's cores are enough";
         Failure::new(format!("threads cannot be started: {e}"), format!("threads = {threads}"), hint)
     })?;
     pool.install(|| build_with(recording, run, config, options, threads, watcher))
+}
+
+/// How many worker threads `asked` means: 0 = as many as there are cores.
+///
+/// # Errors
+/// More than a machine is likely to start; where it cannot, the process would end without a word.
+pub fn threads(asked: usize) -> Result<usize> {
+    let cores = std::thread::available_parallelism().map_or(2, |n| n.get());
+    let most = (4 * cores).max(MOST_THREADS);
+    if asked > most {
+        let hint = format!("at most {most}; this machine has {cores} cores, and more threads than cores gain nothing");
+        return Err(Failure::new("more threads than this machine can use", format!("--threads {asked}"), hint));
+    }
+    Ok(if asked == 0 { cores } else { asked })
 }
 
 fn build_with(
@@ -107,17 +122,20 @@ fn build_with(
 ) -> Result<RunFolder> {
     let recording = Recording::open(recording)?;
     refuse_hopeless(&recording, config.method)?;
-    if options.fresh && run.exists() {
-        std::fs::remove_dir_all(run).map_err(Failure::io(run))?;
-    }
+    RunFolder::may_become_run(run)?;
+    std::fs::create_dir_all(run).map_err(Failure::io(run))?;
+    let _alone = RunLock::take(run)?;
     let mut folder = RunFolder::create(run)?;
+    if options.fresh {
+        folder.empty()?;
+    }
     folder.record.version = env!("CARGO_PKG_VERSION").to_string();
     folder.record.recording = std::fs::canonicalize(&recording.root).unwrap_or_else(|_| recording.root.clone());
     folder.record.fingerprint = recording.fingerprint()?;
     folder.record.threads = threads;
     let text = toml::to_string_pretty(config).expect("a config is a table");
     let path = run.join("config.toml");
-    hingecast_geom::ply::write_whole(&path, text.as_bytes()).map_err(Failure::io(&path))?;
+    hingecast_geom::staging::write_whole(&path, text.as_bytes()).map_err(Failure::io(&path))?;
 
     let cache = ViewCache::new(&recording, config.memory_mb << 20);
     let background = targets::background(&recording, &cache)?;
@@ -138,12 +156,9 @@ fn build_with(
         if i < from && folder.is_done(name, &stamps[i]) {
             watcher.say(&format!("{name:<7} kept"));
         } else {
-            if i >= from {
-                // Asked to redo: forget this stage's checkpoint.
-                let _ = std::fs::remove_file(folder.folder(name).join("stamp"));
-            }
             let start = Instant::now();
-            let at = folder.begin(name, &stamps[i])?;
+            // Asked to redo: then its checkpoint is forgotten, too.
+            let at = folder.begin(name, &stamps[i], i >= from)?;
             let progress = watcher.stage(name);
             run_stage(*stage, &inputs, &mut made, &mut folder, &at, &progress)?;
             drop(progress);

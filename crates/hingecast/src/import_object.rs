@@ -9,7 +9,7 @@ use crate::failure::Result;
 use glam::{DVec3, Vec3};
 use hingecast_capture::object::{ArticulatedObject, PartGeometry};
 use hingecast_capture::synth::useful_ranges;
-use hingecast_geom::folder::may_become;
+use hingecast_geom::folder::{may_be_emptied, may_become};
 use hingecast_geom::{Progress, TriMesh};
 use hingecast_twin::hulls::{HullConfig, decompose};
 use hingecast_twin::{PartModel, Twin, mass};
@@ -57,6 +57,7 @@ pub struct Imported {
 /// When the source cannot be read, or `out` holds something else.
 pub fn import(source: &Path, out: &Path, config: &ImportConfig, progress: &Progress) -> Result<Imported> {
     may_become("output folder", out, &["twin.json"], "give a new folder")?;
+    may_be_emptied("output folder", out, &hingecast_twin::is_ours, "give a new folder, or empty this one yourself")?;
     let mut object = ArticulatedObject::load(source)?;
     let mut changes = Vec::new();
     // The ranges that `synth` plays: files let doors swing through their cabinets.

@@ -40,6 +40,7 @@ pub mod import_object;
 pub mod memory;
 pub mod overrides;
 pub mod report;
+pub mod run_files;
 pub mod stage;
 pub mod stages;
 pub mod watcher;

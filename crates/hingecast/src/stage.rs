@@ -4,13 +4,13 @@
 //! the stage before, the format version). Same stamp: the stage is kept. So the same command resumes.
 
 use crate::failure::{Failure, Result};
-use hingecast_geom::folder::may_become;
-use hingecast_geom::ply::write_whole;
+use crate::run_files::{self, FileRecord, STAMP, files_of, unchanged};
+use hingecast_geom::staging::{sweep_folder, write_whole};
 use serde::{Deserialize, Serialize};
 use std::path::{Path, PathBuf};
 
 /// Grows when the meaning of files in a run changes.
-const FORMAT: u32 = 8;
+const FORMAT: u32 = 9;
 
 /// Name, time and memory of one finished stage.
 #[derive(Clone, Debug, Serialize, Deserialize)]
@@ -20,6 +20,9 @@ pub struct StageRecord {
     pub secs: f64,
     /// Peak resident memory of the process when the stage ended, bytes.
     pub peak_memory: u64,
+    /// What it left. Runs of older versions do not say; their stages are built again.
+    #[serde(default)]
+    pub files: Vec<FileRecord>,
 }
 
 /// `run.json`.
@@ -49,18 +52,49 @@ pub struct RunFolder {
 }
 
 impl RunFolder {
-    /// Whether a build may write into `root`: it is new, empty, or a run. Stages empty their folders and `--fresh`
-    /// the whole, so nothing of a person's may be in there.
+    /// Whether a build may write into `root`: it is new, empty, or a run, which is what has a `run.json` of ours. Many a project has
+    /// folders named parts and report, and a config.toml.
+    ///
+    /// # Errors
+    /// It holds something else.
     pub fn may_become_run(root: &Path) -> Result<()> {
+        if Self::read(root).is_some() || run_files::is_bare(root) {
+            return Ok(());
+        }
         let hint = "give a new folder: hingecast build RECORDING -o RUN";
-        Ok(may_become("run folder", root, &["run.json", "config.toml"], hint)?)
+        Err(Failure::new("the run folder holds something else", root.display().to_string(), hint))
     }
 
-    /// Opens a run, or starts one. A `run.json` that cannot be read starts anew.
+    /// Opens a run, or starts one: `run.json` is the first file in it, so that a run that is killed is known for one.
+    ///
+    /// # Errors
+    /// The folder holds something else, or the disk refuses.
     pub fn create(root: &Path) -> Result<Self> {
+        Self::may_become_run(root)?;
         std::fs::create_dir_all(root).map_err(Failure::io(root))?;
-        let record = Self::read(root).unwrap_or_default();
-        Ok(Self { root: root.to_path_buf(), record })
+        sweep_folder(root);
+        let run = Self { root: root.to_path_buf(), record: Self::read(root).unwrap_or_default() };
+        run.save()?;
+        Ok(run)
+    }
+
+    /// Throws away what is there: the files that hingecast writes into a run, and only if there are no others.
+    ///
+    /// # Errors
+    /// There is another file, or the disk refuses.
+    pub fn empty(&mut self) -> Result<()> {
+        run_files::may_empty_run(&self.root)?;
+        // Before anything goes; and run.json stays, or what is left of a killed one would be no run.
+        self.record = RunRecord::default();
+        self.save()?;
+        for name in run_files::FOLDERS {
+            remove_stage(&self.folder(name))?;
+        }
+        for name in run_files::FILES {
+            let path = self.root.join(name);
+            gone(std::fs::remove_file(&path)).map_err(Failure::io(&path))?;
+        }
+        Ok(())
     }
 
     /// Opens a finished (or half-finished) run.
@@ -80,9 +114,10 @@ impl RunFolder {
         self.root.join(stage)
     }
 
-    /// Whether `stage` is done with this stamp.
+    /// Whether `stage` is done with this stamp, and all that it left is there and unchanged.
     pub fn is_done(&self, stage: &str, stamp: &str) -> bool {
-        self.record.stages.iter().any(|s| s.name == stage && s.stamp == stamp) && self.folder(stage).is_dir()
+        let done = self.record.stages.iter().find(|s| s.name == stage && s.stamp == stamp);
+        done.is_some_and(|s| unchanged(&self.folder(stage), &s.files))
     }
 
     /// Whether `stage` is done, with whatever stamp.
@@ -90,31 +125,41 @@ impl RunFolder {
         self.record.stages.iter().any(|s| s.name == stage)
     }
 
-    /// Empties the stage's folder unless it holds a checkpoint of the same stamp; drops it and all later ones
-    /// from the record.
-    pub fn begin(&mut self, stage: &str, stamp: &str) -> Result<PathBuf> {
-        let folder = self.folder(stage);
-        let mark = folder.join("stamp");
-        if std::fs::read_to_string(&mark).ok().as_deref() != Some(stamp) {
-            if folder.exists() {
-                std::fs::remove_dir_all(&folder).map_err(Failure::io(&folder))?;
-            }
-            std::fs::create_dir_all(&folder).map_err(Failure::io(&folder))?;
-            write_whole(&mark, stamp.as_bytes()).map_err(Failure::io(&mark))?;
-        }
+    /// Drops the stage and all later ones from the record; then empties its folder, unless that holds a checkpoint of the same stamp
+    /// (`redo`: also then). In this order: killed in between, half a stage is never taken for a whole one.
+    ///
+    /// # Errors
+    /// The folder holds a file that hingecast does not write, or the disk refuses.
+    pub fn begin(&mut self, stage: &str, stamp: &str, redo: bool) -> Result<PathBuf> {
+        run_files::may_empty_stage(&self.root, stage)?;
         if let Some(at) = self.record.stages.iter().position(|s| s.name == stage) {
             self.record.stages.truncate(at);
         }
         self.save()?;
+        let folder = self.folder(stage);
+        let mark = folder.join(STAMP);
+        if redo || std::fs::read_to_string(&mark).ok().as_deref() != Some(stamp) {
+            remove_stage(&folder)?;
+            std::fs::create_dir_all(&folder).map_err(Failure::io(&folder))?;
+            write_whole(&mark, stamp.as_bytes()).map_err(Failure::io(&mark))?;
+        }
+        sweep_folder(&folder);
         Ok(folder)
     }
 
+    /// # Errors
+    /// When what the stage left cannot be read, or `run.json` not be written.
     pub fn finish(&mut self, stage: &str, stamp: &str, secs: f64) -> Result<()> {
+        debug_assert!(
+            run_files::may_empty_stage(&self.root, stage).is_ok(),
+            "{stage} wrote a file that run_files does not know"
+        );
         self.record.stages.push(StageRecord {
             name: stage.to_string(),
             stamp: stamp.to_string(),
             secs,
             peak_memory: crate::memory::peak_memory(),
+            files: files_of(&self.folder(stage))?,
         });
         self.save()
     }
@@ -122,6 +167,18 @@ impl RunFolder {
     pub fn save(&self) -> Result<()> {
         write_json(&self.root.join("run.json"), &self.record)
     }
+}
+
+/// The stamp goes first: a folder that is half gone must not pass for one with a checkpoint.
+fn remove_stage(folder: &Path) -> Result<()> {
+    let mark = folder.join(STAMP);
+    gone(std::fs::remove_file(&mark)).map_err(Failure::io(&mark))?;
+    gone(std::fs::remove_dir_all(folder)).map_err(Failure::io(folder))
+}
+
+/// What was not there need not be removed.
+fn gone(removed: std::io::Result<()>) -> std::io::Result<()> {
+    removed.or_else(|e| if e.kind() == std::io::ErrorKind::NotFound { Ok(()) } else { Err(e) })
 }
 
 /// 128 bits of FNV-1a over the parts' JSON: not for adversaries, only to notice change.

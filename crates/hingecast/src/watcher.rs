@@ -1,5 +1,6 @@
 //! What a build tells whoever started it: the library has no terminal.
 
+use crate::failure::Failure;
 use hingecast_geom::Progress;
 
 /// Hears of stages and results, and may wish the build to stop.
@@ -9,6 +10,9 @@ pub trait Watcher: Sync {
 
     /// A line for people.
     fn say(&self, line: &str);
+
+    /// Something failed and the work goes on.
+    fn complain(&self, failure: &Failure);
 }
 
 /// Hears nothing, stops nothing.
@@ -21,4 +25,6 @@ impl Watcher for Silent {
     }
 
     fn say(&self, _: &str) {}
+
+    fn complain(&self, _: &Failure) {}
 }

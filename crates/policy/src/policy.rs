@@ -5,7 +5,7 @@
 
 use crate::PolicyError;
 use crate::net::{NetConfig, Network};
-use hingecast_geom::ply::write_whole;
+use hingecast_geom::staging::write_whole;
 use safetensors::tensor::{Dtype, SafeTensors, TensorView};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;

@@ -7,6 +7,7 @@
 use crate::engine::Engine;
 use crate::error::SplatError;
 use crate::params::Planes;
+use hingecast_geom::staging::write_whole;
 use serde_json::{Value, json};
 use std::path::Path;
 
@@ -58,9 +59,7 @@ pub fn save(engine: &Engine, checkpoint: &Checkpoint, path: &Path) -> Result<(),
             out.extend(planes.plane(k).iter().flat_map(|v| v.to_le_bytes()));
         }
     }
-    let temporary = path.with_extension("partial");
-    std::fs::write(&temporary, out).map_err(io)?;
-    std::fs::rename(&temporary, path).map_err(io)
+    write_whole(path, &out).map_err(io)
 }
 
 /// Restores parameters and Adam state into an engine of the same size.

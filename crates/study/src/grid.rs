@@ -84,7 +84,8 @@ pub fn run(host: &Host, request: &Request) -> Result<(Vec<Row>, String)> {
                         rows.push(Row { protocol: protocol.to_string(), seed, evaluation });
                     }
                     Err(failure) if failure.cancelled => return Err(failure),
-                    Err(failure) => host.tell_error(&failure),
+                    // One broken object must not hide the others' figures.
+                    Err(failure) => host.watcher.complain(&failure),
                 }
             }
         }

@@ -1,7 +1,6 @@
 //! What a study runs on, and whom it tells.
 
 use hingecast::build::Options;
-use hingecast::failure::Failure;
 use hingecast::watcher::Watcher;
 
 /// The machine's threads, and a listener.
@@ -17,10 +16,5 @@ impl Host<'_> {
     /// How builds run here.
     pub fn options(&self) -> Options {
         Options { threads: self.threads, ..Options::default() }
-    }
-
-    /// One broken object must not hide the others' figures: its error is told, and the study goes on.
-    pub fn tell_error(&self, failure: &Failure) {
-        self.watcher.say(&format!("error: {failure}"));
     }
 }

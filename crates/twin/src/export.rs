@@ -6,7 +6,8 @@
 use crate::link::{hull_file, link_origin, mean_color, visual_file};
 use crate::{PartModel, Twin, mjcf, urdf};
 use glam::{DVec3, Vec3};
-use hingecast_geom::ply::{PlyError, write_whole};
+use hingecast_geom::ply::PlyError;
+use hingecast_geom::staging::{Staging, write_whole};
 use hingecast_geom::{Gaussians, Pose, TriMesh};
 use serde_json::json;
 use std::path::{Path, PathBuf};
@@ -29,7 +30,8 @@ pub enum ExportError {
     Ply(#[from] PlyError),
 }
 
-/// Writes the whole folder beside `dir` and renames it into place. `splats`: gaussians in the canonical world
+/// Writes the whole folder beside `dir` and renames it into place; what stands there goes, so whoever calls makes sure that it
+/// [`is_ours`]. `splats`: gaussians in the canonical world
 /// and the part of each.
 ///
 /// # Errors
@@ -38,14 +40,12 @@ pub enum ExportError {
 /// # Panics
 /// When `splats` has fewer parts than gaussians.
 pub fn write(twin: &Twin, splats: Option<(&Gaussians, &[u8])>, dir: &Path) -> Result<(), ExportError> {
-    let staging = dir.with_extension("tmp");
     let at = |path: &Path| {
         let path = path.to_path_buf();
         move |source| ExportError::Io { path, source }
     };
-    if staging.exists() {
-        std::fs::remove_dir_all(&staging).map_err(at(&staging))?;
-    }
+    let whole = Staging::new(dir).map_err(at(dir))?;
+    let staging = whole.path();
     for folder in ["meshes/visual", "meshes/collision", "splats"] {
         let folder = staging.join(folder);
         std::fs::create_dir_all(&folder).map_err(at(&folder))?;
@@ -67,10 +67,23 @@ pub fn write(twin: &Twin, splats: Option<(&Gaussians, &[u8])>, dir: &Path) -> Re
     text("robot.urdf", urdf::to_string(twin))?;
     text("robot.xml", mjcf::to_string(twin))?;
     text("twin.json", serde_json::to_string_pretty(&summary(twin)).expect("plain data") + "\n")?;
-    if dir.exists() {
-        std::fs::remove_dir_all(dir).map_err(at(dir))?;
+    whole.finish().map_err(at(dir))
+}
+
+/// Whether a file of this path, from the twin folder, is one that [`write`] writes.
+pub fn is_ours(path: &Path) -> bool {
+    let names: Option<Vec<&str>> = path.iter().map(|name| name.to_str()).collect();
+    let part = |name: &str, ends: &[&str]| {
+        ends.iter()
+            .any(|end| name.strip_prefix("part_").and_then(|n| n.strip_suffix(end)).is_some_and(|n| !n.is_empty()))
+    };
+    match names.as_deref() {
+        Some(["twin.json" | "robot.urdf" | "robot.xml"]) => true,
+        Some(["meshes", "visual", name]) => part(name, &[".obj", ".ply"]),
+        Some(["meshes", "collision", name]) => part(name, &[".stl"]),
+        Some(["splats", name]) => part(name, &[".ply"]),
+        _ => false,
     }
-    std::fs::rename(&staging, dir).map_err(at(dir))
 }
 
 fn write_part(dir: &Path, index: usize, part: &PartModel, origin: DVec3) -> Result<(), ExportError> {

@@ -81,7 +81,7 @@ mod vertices;
 mod xml;
 
 pub use build::{Config, build};
-pub use export::{ExportError, write};
+pub use export::{ExportError, is_ours, write};
 
 use glam::{DMat3, DVec3};
 use hingecast_geom::{Camera, Certainty, KinematicTree, TriMesh};

@@ -51,7 +51,7 @@ pub(super) fn store(shots: &[Shot], name: &str, out: &Path, progress: &Progress)
     for folder in ["depth", "mask", "occluder"] {
         let _ = std::fs::remove_dir(work.path.join(folder));
     }
-    work.finish(&out)?;
+    work.finish()?;
     // What was written should open; if not, the source has gaps in its states.
     Recording::open(&out)
 }

@@ -1,7 +1,7 @@
 //! Single images in and out: colour, mask, depth. Errors name the file.
 
 use crate::CaptureError;
-use hingecast_geom::ply::write_whole;
+use hingecast_geom::staging::{write_quick, write_whole};
 use image::codecs::png::{CompressionType, FilterType, PngEncoder};
 use image::{DynamicImage, ExtendedColorType, ImageEncoder};
 use std::path::Path;
@@ -124,10 +124,10 @@ fn write_png(path: &Path, bytes: &[u8], w: usize, h: usize, color: ExtendedColor
     let mut out = Vec::with_capacity(bytes.len() / 2 + 1024);
     let encoder = PngEncoder::new_with_quality(&mut out, CompressionType::Fast, FilterType::Adaptive);
     encoder.write_image(bytes, w as u32, h as u32, color).map_err(|e| CaptureError::write(path, e))?;
-    write_file(path, &out)
+    write_quick(path, &out).map_err(|e| CaptureError::write(path, e))
 }
 
-/// Writes a file to a temporary name beside it and renames: readers never see half a file.
+/// Writes a file that is whole or absent, also after a power cut.
 ///
 /// # Errors
 /// When the file cannot be written.

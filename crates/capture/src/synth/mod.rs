@@ -97,11 +97,11 @@ pub fn synth(
         up: DVec3::Z,
     };
     recording.write()?;
-    if let Some(truth) = &truth_work {
+    if let Some(truth) = truth_work {
         output::write_truth(object, config, &ranges, &states, &shots, &truth.path)?;
-        truth.finish(&truth_out)?;
+        truth.finish()?;
     }
-    work.finish(&out)?;
+    work.finish()?;
     let names = object.tree.joints.iter().map(|j| j.name.clone());
     Ok(SynthReport {
         recording: out,

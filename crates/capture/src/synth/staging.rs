@@ -1,27 +1,26 @@
-//! Folders that appear whole or not at all.
+//! Recordings and their truths appear whole or not at all, and replace nothing but recordings and truths.
 
 use crate::CaptureError;
-use hingecast_geom::folder::may_become;
+use hingecast_geom::folder::{may_be_emptied, may_become};
+use hingecast_geom::staging;
 use std::path::{Path, PathBuf};
 
-/// A folder that is filled under a temporary name and takes its place when all is there.
+const HINT: &str = "give a new folder, or empty this one yourself";
+
+/// A folder that is filled under a name of its own and takes its place when all is there.
 pub(crate) struct Staging {
     pub path: PathBuf,
+    target: PathBuf,
+    staging: staging::Staging,
 }
 
 impl Staging {
     /// # Errors
     /// When `target` holds something that is no recording: nothing of a person's is ever removed.
     pub fn new(target: &Path) -> Result<Self, CaptureError> {
-        let hint = "give a new folder, or empty this one yourself";
-        may_become("output folder", target, &["transforms.json", "truth.json"], hint)?;
-        let mut name = target.file_name().unwrap_or_default().to_os_string();
-        name.push(".part");
-        let path = target.with_file_name(name);
-        // Left over from a run that was killed.
-        let _ = std::fs::remove_dir_all(&path);
-        std::fs::create_dir_all(&path).map_err(|e| CaptureError::write(&path, e))?;
-        Ok(Self { path })
+        may_be_replaced(target)?;
+        let staging = staging::Staging::new(target).map_err(|e| CaptureError::write(target, e))?;
+        Ok(Self { path: staging.path(), target: target.to_path_buf(), staging })
     }
 
     pub fn folder(&self, name: &str) -> Result<(), CaptureError> {
@@ -29,17 +28,78 @@ impl Staging {
         std::fs::create_dir_all(&path).map_err(|e| CaptureError::write(&path, e))
     }
 
-    pub fn finish(&self, target: &Path) -> Result<(), CaptureError> {
-        if target.exists() {
-            std::fs::remove_dir_all(target).map_err(|e| CaptureError::write(target, e))?;
-        }
-        std::fs::rename(&self.path, target).map_err(|e| CaptureError::write(target, e))
+    /// # Errors
+    /// When the disk refuses, or something was put at the target meanwhile.
+    pub fn finish(self) -> Result<(), CaptureError> {
+        may_be_replaced(&self.target)?;
+        self.staging.finish().map_err(|e| CaptureError::write(&self.target, e))
     }
 }
 
-impl Drop for Staging {
-    fn drop(&mut self) {
-        // After `finish` there is nothing left under the temporary name.
-        let _ = std::fs::remove_dir_all(&self.path);
+/// `transforms.json` alone is no proof: captures of people have one as well, beside pictures that nobody can take again.
+fn may_be_replaced(target: &Path) -> Result<(), CaptureError> {
+    may_become("output folder", target, &["transforms.json", "truth.json"], HINT)?;
+    may_be_emptied(
+        "output folder",
+        target,
+        &|path| is_ours(path) && (target.join(path) != transforms(target) || wrote(target)),
+        HINT,
+    )?;
+    Ok(())
+}
+
+fn transforms(target: &Path) -> PathBuf {
+    target.join("transforms.json")
+}
+
+/// Whether we wrote the recording's `transforms.json`: others' do not say what is up and whether it is metric.
+fn wrote(target: &Path) -> bool {
+    let text = std::fs::read(transforms(target)).unwrap_or_default();
+    let json: serde_json::Value = serde_json::from_slice(&text).unwrap_or_default();
+    ["up", "metric", "frames"].iter().all(|key| json.get(key).is_some())
+}
+
+/// Whether a file of this path is one that `synth` or `import` writes into a recording or its truth.
+fn is_ours(path: &Path) -> bool {
+    let names: Option<Vec<&str>> = path.iter().map(|name| name.to_str()).collect();
+    match names.as_deref() {
+        Some(["transforms.json" | "truth.json"]) => true,
+        Some(["rgb" | "depth" | "mask" | "occluder" | "labels", name]) => is_view(name),
+        Some(["parts", name]) => name.ends_with(".ply"),
+        _ => false,
+    }
+}
+
+/// `s003_v012.png`.
+fn is_view(name: &str) -> bool {
+    let number = |text: &str| text.len() >= 3 && text.bytes().all(|b| b.is_ascii_digit());
+    let numbers =
+        name.strip_prefix('s').and_then(|rest| rest.strip_suffix(".png")).and_then(|rest| rest.split_once("_v"));
+    numbers.is_some_and(|(state, view)| number(state) && number(view))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::fs;
+
+    /// Any folder with a transforms.json once was replaced as a whole, a person's captures included.
+    #[test]
+    fn only_what_we_wrote_is_replaced() {
+        let dir = tempfile::tempdir().unwrap();
+        let target = dir.path().join("rec");
+        let refused = || may_be_replaced(&target).err().map(|e| e.what);
+        fs::create_dir_all(target.join("rgb")).unwrap();
+        fs::write(target.join("transforms.json"), r#"{"frames": [], "up": [0, 0, 1], "metric": true}"#).unwrap();
+        fs::write(target.join("rgb/s000_v012.png"), "").unwrap();
+        assert_eq!(refused(), None);
+        for foreign in ["rgb/IMG_0001.png", "notes.txt", "rgb/s000_v1.jpg", "images/s000_v012.png"] {
+            fs::create_dir_all(target.join(foreign).parent().unwrap()).unwrap();
+            fs::write(target.join(foreign), "years").unwrap();
+            assert!(refused().is_some_and(|what| what.ends_with(foreign)), "{foreign}");
+            fs::remove_file(target.join(foreign)).unwrap();
+        }
+        fs::write(target.join("transforms.json"), r#"{"frames": []}"#).unwrap();
+        assert!(refused().is_some());
     }
 }

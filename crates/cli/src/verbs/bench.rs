@@ -31,7 +31,7 @@ pub fn run(session: &Session, args: &Bench) -> Result<Outcome> {
             }
             Err(failure) if failure.cancelled => return Err(failure),
             // One broken object must not hide the others' figures.
-            Err(failure) => session.host().tell_error(&failure),
+            Err(failure) => session.ui.complain(&failure),
         }
         if args.tidy {
             let _ = std::fs::remove_dir_all(&recording);
@@ -42,7 +42,7 @@ pub fn run(session: &Session, args: &Bench) -> Result<Outcome> {
     write_json(&args.out.join("bench.json"), &evaluations)?;
     let path = args.out.join("bench.md");
     std::fs::write(&path, &text).map_err(Failure::io(&path))?;
-    session.answer(&evaluations);
+    session.answer(&evaluations)?;
     let mut outcome = if evaluations.len() < suite.len() { Outcome::UnderBar } else { Outcome::Done };
     if let Some(before) = &before {
         let worse = compare(before, &evaluations);
@@ -71,7 +71,7 @@ fn joints(session: &Session, args: &Bench, suite: &[Named]) -> Result<Outcome> {
     write_json(&args.out.join("joints.json"), &rows)?;
     let path = args.out.join("joints.md");
     std::fs::write(&path, &text).map_err(Failure::io(&path))?;
-    session.answer(&rows);
+    session.answer(&rows)?;
     Ok(Outcome::Done)
 }
 

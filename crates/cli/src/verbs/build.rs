@@ -52,7 +52,7 @@ pub fn run(session: &Session, args: &Build) -> Result<Outcome> {
     let run = hingecast::build::build(&args.recording, &out, &config, &options, &session.ui)?;
     if let Some(to) = args.to.as_deref().filter(|to| *to != "twin") {
         session.ui.say(&format!("stopped after {to}, as asked; run again without --to for the twin"));
-        session.answer(&serde_json::json!({ "run": run.root, "to": to, "secs": run.record.total_secs() }));
+        session.answer(&serde_json::json!({ "run": run.root, "to": to, "secs": run.record.total_secs() }))?;
         return Ok(Outcome::Done);
     }
     let page = report::write(&run)?;
@@ -68,6 +68,6 @@ pub fn run(session: &Session, args: &Build) -> Result<Outcome> {
     session.answer(&serde_json::json!({
         "run": run.root, "twin": run.folder("twin"), "report": page, "secs": run.record.total_secs(),
         "peak_memory": run.record.peak_memory(), "doubts": run.record.doubts,
-    }));
+    }))?;
     Ok(if args.strict && !run.record.doubts.is_empty() { Outcome::UnderBar } else { Outcome::Done })
 }

@@ -31,6 +31,7 @@ pub fn run(session: &Session, args: &Check) -> Result<Outcome> {
     if report.findings.is_empty() {
         session.ui.say("nothing wrong was found");
     }
-    session.answer(&serde_json::json!({ "findings": report.findings, "states": report.states, "repaired": repaired }));
+    session
+        .answer(&serde_json::json!({ "findings": report.findings, "states": report.states, "repaired": repaired }))?;
     Ok(if report.has_errors() { Outcome::UnderBar } else { Outcome::Done })
 }

@@ -28,6 +28,6 @@ pub fn run(session: &Session, args: &Demo) -> Result<Outcome> {
     let twin = folder.folder("twin");
     session.ui.say(&format!("\nreport: {}\ntwin:   {}", page.display(), twin.display()));
     session.ui.say(&format!("look:   python -m mujoco.viewer --mjcf={}", twin.join("robot.xml").display()));
-    session.answer(&evaluation);
+    session.answer(&evaluation)?;
     Ok(Outcome::Done)
 }

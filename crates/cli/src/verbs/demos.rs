@@ -3,7 +3,7 @@
 use super::{Outcome, Session};
 use crate::cli::Demos;
 use hingecast::failure::{Failure, Result};
-use hingecast_geom::ply::write_whole;
+use hingecast_geom::staging::write_whole;
 use hingecast_policy::demos::{read, write};
 use hingecast_sim::trial::make_task;
 use hingecast_sim::{Scene, SceneConfig, TaskKind, TaskSpec};
@@ -50,7 +50,7 @@ pub fn run(session: &Session, args: &Demos) -> Result<Outcome> {
     session.answer(&serde_json::json!({
         "demos": out, "kept": recorded.kept, "thrown_away": recorded.thrown_away, "steps": recorded.steps,
         "secs": secs, "task": task,
-    }));
+    }))?;
     Ok(Outcome::Done)
 }
 
@@ -88,7 +88,8 @@ fn teleoperate(session: &Session, args: &Demos, out: &Path, object: PathBuf, kin
         pace.worst_late_ms,
         f64::from(pace.pictures) / pace.secs.max(1e-3)
     ));
-    session.answer(&serde_json::json!({ "demos": out, "kept": all, "new": all.saturating_sub(before), "pace": pace }));
+    session
+        .answer(&serde_json::json!({ "demos": out, "kept": all, "new": all.saturating_sub(before), "pace": pace }))?;
     Ok(Outcome::Done)
 }
 
@@ -151,6 +152,6 @@ fn inspect(session: &Session, file: &Path) -> Result<Outcome> {
     session.answer(&serde_json::json!({
         "demos": file, "episodes": demos.episodes.len(), "steps": demos.steps(), "lengths": lengths, "plot": svg,
         "replay": replayed, "env_args": demos.env_args,
-    }));
+    }))?;
     Ok(if replayed.equal == replayed.episodes { Outcome::Done } else { Outcome::UnderBar })
 }

@@ -15,6 +15,6 @@ pub fn run(session: &Session) -> Result<Outcome> {
         if mujoco { "3.17.0, linked" } else { "not built in (feature `mujoco`)" }
     ));
     session.ui.say(&format!("real objects     {}", data.as_deref().unwrap_or("none: HINGECAST_DATA is not set")));
-    session.answer(&serde_json::json!({ "threads": session.threads, "simd": simd, "mujoco": mujoco, "data": data }));
+    session.answer(&serde_json::json!({ "threads": session.threads, "simd": simd, "mujoco": mujoco, "data": data }))?;
     Ok(Outcome::Done)
 }

@@ -10,7 +10,7 @@ pub fn run(session: &Session, args: &Eval) -> Result<Outcome> {
     let bars = args.bars.iter().map(|text| Bar::read(text)).collect::<Result<Vec<_>>>()?;
     let evaluation = evaluate(&args.run, &args.truth, &session.ui.stage("eval"))?;
     session.ui.say(&table::detail(&evaluation));
-    session.answer(&evaluation);
+    session.answer(&evaluation)?;
     let mut outcome = Outcome::Done;
     for (bar, text) in bars.iter().zip(&args.bars) {
         let (value, kept) = bar.judge(&evaluation);

@@ -4,7 +4,7 @@ use super::{Outcome, Session, build, synth};
 use crate::cli;
 use hingecast::failure::{Failure, Result};
 use hingecast::stage::write_json;
-use hingecast_geom::ply::write_whole;
+use hingecast_geom::staging::write_whole;
 use hingecast_study::experiment::cast::Cast;
 use hingecast_study::experiment::plan::Plan;
 use hingecast_study::experiment::steps::{Clock, Ledger, Steps};
@@ -35,7 +35,7 @@ pub fn run(session: &Session, args: &cli::Experiment) -> Result<Outcome> {
     }
     session.ui.say(&format!("\n{}", table::markdown(&experiment)));
     session.ui.say(&format!("table and plot: {}", args.out.join("experiment.{md,csv,json,svg}").display()));
-    session.answer(&experiment);
+    session.answer(&experiment)?;
     let measured = experiment.rows.iter().any(|r| r.failed.is_none());
     Ok(if measured { Outcome::Done } else { Outcome::UnderBar })
 }

@@ -10,6 +10,6 @@ pub fn run(session: &Session, args: &Import) -> Result<Outcome> {
     let report = import(&args.source, &args.out, format, &session.ui.stage("import"))?;
     session.ui.say(&format!("imported {} frames -> {}", report.frames, report.recording.display()));
     session.ui.say(&format!("next: hingecast check {}", report.recording.display()));
-    session.answer(&serde_json::json!({ "recording": report.recording, "frames": report.frames }));
+    session.answer(&serde_json::json!({ "recording": report.recording, "frames": report.frames }))?;
     Ok(Outcome::Done)
 }

@@ -26,7 +26,7 @@ pub fn run(session: &Session, args: &ImportObject) -> Result<Outcome> {
     imported.joints.iter().for_each(|j| session.ui.say(&format!("  joint {j}")));
     imported.changes.iter().for_each(|c| session.ui.say(&format!("  changed: {c}")));
     doubts.iter().for_each(|d| session.ui.say(&format!("  doubt: {d}")));
-    session.answer(&serde_json::json!({ "object": args.out, "imported": imported, "doubts": doubts }));
+    session.answer(&serde_json::json!({ "object": args.out, "imported": imported, "doubts": doubts }))?;
     Ok(Outcome::Done)
 }
 

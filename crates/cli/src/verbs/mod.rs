@@ -19,7 +19,7 @@ mod table;
 mod train;
 
 use crate::cli::{Cli, Verb};
-use crate::ui::Ui;
+use crate::ui::{Ui, answer};
 use hingecast::failure::Result;
 use hingecast::{report, stage::RunFolder};
 
@@ -48,15 +48,16 @@ impl Session {
     }
 
     /// The machine's answer, when it was asked for.
-    pub fn answer(&self, value: &impl serde::Serialize) {
-        if self.json {
-            println!("{}", serde_json::to_string(value).expect("plain data"));
-        }
+    ///
+    /// # Errors
+    /// It cannot be written.
+    pub fn answer(&self, value: &impl serde::Serialize) -> Result<()> {
+        if self.json { answer(&serde_json::to_string(value).expect("plain data")) } else { Ok(()) }
     }
 }
 
 pub fn run(cli: &Cli) -> Result<Outcome> {
-    let threads = cli.threads.unwrap_or_else(|| std::thread::available_parallelism().map_or(2, |n| n.get())).max(1);
+    let threads = hingecast::build::threads(cli.threads.unwrap_or(0))?;
     // Fails only when a pool is there already: then that one serves.
     let _ = rayon::ThreadPoolBuilder::new().num_threads(threads).build_global();
     let session = Session { ui: Ui::new(cli.quiet), json: cli.json, threads };
@@ -72,7 +73,7 @@ pub fn run(cli: &Cli) -> Result<Outcome> {
         Verb::Report(args) => {
             let path = report::write(&RunFolder::open(&args.run)?)?;
             session.ui.say(&format!("report: {}", path.display()));
-            session.answer(&serde_json::json!({ "report": path }));
+            session.answer(&serde_json::json!({ "report": path }))?;
             Ok(Outcome::Done)
         }
         #[cfg(feature = "mujoco")]

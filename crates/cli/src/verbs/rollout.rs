@@ -68,7 +68,7 @@ pub fn run(session: &Session, args: &Rollout) -> Result<Outcome> {
     if let Some(page) = &page {
         session.ui.say(&format!("report: {}", page.display()));
     }
-    session.answer(&serde_json::json!({ "worlds": results, "secs": secs, "task": task, "report": page }));
+    session.answer(&serde_json::json!({ "worlds": results, "secs": secs, "task": task, "report": page }))?;
     Ok(Outcome::Done)
 }
 

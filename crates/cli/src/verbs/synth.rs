@@ -48,6 +48,6 @@ pub fn run(session: &Session, args: &Synth) -> Result<Outcome> {
     }
     session.answer(&serde_json::json!({
         "recording": report.recording, "truth": report.truth, "images": report.frames, "secs": secs,
-    }));
+    }))?;
     Ok(Outcome::Done)
 }

@@ -41,7 +41,7 @@ pub fn run(session: &Session, args: &Train) -> Result<Outcome> {
         "policy": args.out, "steps": report.steps, "resumed_from": report.resumed_from, "parameters": report.parameters,
         "train_demos": report.train_demos, "valid_demos": report.valid_demos, "train_loss": last.train,
         "valid_loss": last.valid, "secs": secs,
-    }));
+    }))?;
     Ok(Outcome::Done)
 }
 
@@ -60,7 +60,7 @@ fn run_sweep(
     drop(progress);
     session.ui.say(&sweep::table(&rows));
     session.ui.say(&format!("table and plots: {}", args.out.display()));
-    session.answer(&rows);
+    session.answer(&rows)?;
     if rows.iter().all(|row| row.failed.is_some()) {
         let why = rows.first().and_then(|row| row.failed.clone()).unwrap_or_default();
         let hint = "see the table; train one of them alone: hingecast train DEMOS -o POLICY --set KEY=VALUE";

@@ -1,12 +1,12 @@
 //! `joints/joints.json`: the tree that the twin is built by, with a person's corrections.
 
+use super::check::{self, Verdict, checked, read_checked};
 use super::write_and_settle;
 use crate::failure::Result;
-use crate::stage::read_json;
 use hingecast_articulate::Doubt;
 use hingecast_geom::{Certainty, KinematicTree};
 use serde::{Deserialize, Serialize};
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 /// `joints/joints.json`
 #[derive(Clone, Debug, Serialize, Deserialize)]
@@ -32,6 +32,25 @@ impl Joints {
     /// # Errors
     /// When the file is missing or not ours.
     pub fn read(run: &Path) -> Result<Self> {
-        read_json(&run.join("joints").join("joints.json"))
+        read_checked(&Self::file(run), |joints: &Self| {
+            check::tree(&joints.tree)?;
+            check::labels(&joints.labels, joints.tree.parts.len())
+        })
+    }
+
+    /// Whether they belong to a recording of so many states and to so many gaussians.
+    ///
+    /// # Errors
+    /// They do not: files of different builds, or a recording that changed.
+    pub fn fit(&self, run: &Path, n_states: usize, n_gaussians: usize) -> Result<()> {
+        let verdict = || -> Verdict {
+            check::states(&self.tree, n_states)?;
+            check::as_many("labels", self.labels.len(), "gaussians", n_gaussians)
+        };
+        checked(&Self::file(run), verdict())
+    }
+
+    fn file(run: &Path) -> PathBuf {
+        run.join("joints").join("joints.json")
     }
 }

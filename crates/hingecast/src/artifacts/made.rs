@@ -42,7 +42,7 @@ impl Made {
 
     /// The labelled surface of every state.
     pub fn samples(&self) -> Result<&Vec<Labelled>> {
-        get(&self.samples, || samples::read(&self.run))
+        get(&self.samples, || samples::read(&self.run, &self.parts()?.tree))
     }
 
     /// Of `--method track`.

@@ -10,6 +10,7 @@
 //! A stage hands its artifact on as its file says it ([`as_written`]), so that a run that was resumed has the same bytes as one that
 //! was not. [`Made`] keeps artifacts in memory; files are read back for stages that were kept.
 
+pub mod check;
 pub mod joints;
 pub mod made;
 pub mod parts;

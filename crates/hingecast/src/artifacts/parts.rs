@@ -1,5 +1,6 @@
 //! `parts/parts.json`, `parts/trace.json`: what moves, and how, by the depth of all states.
 
+use super::check::{self, read_checked};
 use super::write_and_settle;
 use crate::failure::Result;
 use crate::stage::{read_json, write_json};
@@ -66,7 +67,18 @@ impl Parts {
     /// # Errors
     /// When the file is missing or not ours.
     pub fn read(run: &Path) -> Result<Self> {
-        read_json(&run.join("parts").join("parts.json"))
+        read_checked(&run.join("parts").join("parts.json"), |parts: &Self| {
+            let n = parts.tree.parts.len();
+            check::tree(&parts.tree)?;
+            check::as_many("certainties", parts.certainty.len(), "joints", parts.tree.joints.len())?;
+            let rows = &parts.information;
+            rows.iter().try_for_each(|row| check::as_many("informations of a state", row.len(), "parts", n))?;
+            check::finite(
+                "the object's box",
+                &[parts.lo, parts.hi].concat().into_iter().map(f64::from).collect::<Vec<_>>(),
+            )?;
+            if parts.voxel.is_finite() && parts.voxel > 0.0 { Ok(()) } else { Err("voxel is not a length".into()) }
+        })
     }
 
     /// What every pass did, if this run says so.

@@ -1,5 +1,6 @@
 //! `parts/samples.ply`: the surface of every state, sample by sample, with its part.
 
+use super::check::checked;
 use crate::failure::{Failure, Result};
 use glam::Vec3;
 use hingecast_articulate::Labelled;
@@ -16,11 +17,11 @@ pub fn write(folder: &Path, samples: &[Labelled]) -> Result<()> {
     Ok(write_float_vertices(&folder.join("samples.ply"), &COLUMNS.map(String::from), &rows)?)
 }
 
-/// Of a finished stage.
+/// Of a finished stage; `tree`: that of the same stage, whose parts and states the samples name.
 ///
 /// # Errors
 /// When the file is missing or not ours.
-pub fn read(run: &Path) -> Result<Vec<Labelled>> {
+pub fn read(run: &Path, tree: &KinematicTree) -> Result<Vec<Labelled>> {
     let path = run.join("parts").join("samples.ply");
     let table = read_vertices(&path)?;
     if table.names != COLUMNS {
@@ -28,7 +29,13 @@ pub fn read(run: &Path) -> Result<Vec<Labelled>> {
         return Err(Failure::new("not a file of labelled samples", place, "build again with --from parts"));
     }
     let row = |r: &[f32]| Labelled { point: Vec3::new(r[0], r[1], r[2]), state: r[3] as usize, part: r[4] as u8 };
-    Ok(table.data.chunks_exact(COLUMNS.len()).map(row).collect())
+    let samples: Vec<Labelled> = table.data.chunks_exact(COLUMNS.len()).map(row).collect();
+    let n_states = tree.joints.first().map_or(usize::MAX, |j| j.values.len());
+    let nowhere = |s: &Labelled| usize::from(s.part) >= tree.parts.len() || s.state >= n_states || !s.point.is_finite();
+    let verdict =
+        samples.iter().position(nowhere).map_or(Ok(()), |i| Err(format!("sample {i} is of no part or state")));
+    checked(&path, verdict)?;
+    Ok(samples)
 }
 
 /// At most `most` points of every part's surface, where the first state has it.

@@ -1,8 +1,8 @@
 //! `splat/`: the gaussians, the object's size, and what the pictures said about the joints.
 
+use super::check::{self, read_checked};
 use super::write_and_settle;
 use crate::failure::Result;
-use crate::stage::read_json;
 use hingecast_capture::Recording;
 use hingecast_geom::{Gaussians, KinematicTree, Pose};
 use serde::{Deserialize, Serialize};
@@ -49,7 +49,8 @@ impl Placed {
     /// Corrects cameras (camera_from_world by frame) by what their states' worlds were off.
     pub fn correct(&self, recording: &Recording, cameras: &mut BTreeMap<usize, Pose>) {
         for (frame, camera) in cameras {
-            if let Some(state_from_world) = self.state_from_world.get(recording.frames[*frame].state) {
+            let state = recording.frames.get(*frame).map(|f| f.state);
+            if let Some(state_from_world) = state.and_then(|s| self.state_from_world.get(s)) {
                 *camera = *camera * *state_from_world;
             }
         }
@@ -72,10 +73,17 @@ impl Splats {
     pub fn read(run: &Path) -> Result<Self> {
         let at = run.join("splat");
         let placed = at.join("placed.json");
-        Ok(Self {
-            gaussians: Gaussians::read_ply(&at.join("gaussians.ply"))?,
-            extent: read_json(&at.join("extent.json"))?,
-            placed: placed.is_file().then(|| read_json(&placed)).transpose()?,
-        })
+        let gaussians = Gaussians::read_ply(&at.join("gaussians.ply"))?;
+        let extent = read_checked(&at.join("extent.json"), |e: &Extent| {
+            check::finite("the object's box", &[e.lo, e.hi].concat())?;
+            if e.diagonal.is_finite() && e.diagonal > 0.0 { Ok(()) } else { Err("diagonal is not a length".into()) }
+        })?;
+        let check_placed = |p: &Placed| {
+            check::tree(&p.tree)?;
+            check::labels(&p.parts, p.tree.parts.len())?;
+            check::as_many("labels", p.parts.len(), "gaussians", gaussians.len())
+        };
+        let placed = placed.is_file().then(|| read_checked(&placed, check_placed)).transpose()?;
+        Ok(Self { gaussians, extent, placed })
     }
 }

@@ -1,8 +1,8 @@
 //! What the classical way (`--method track`) leaves: `motion/state_<n>.ply` and its own `parts/parts.json`.
 
+use super::check::{self, checked, read_checked};
 use super::write_and_settle;
 use crate::failure::{Failure, Result};
-use crate::stage::read_json;
 use hingecast_articulate::classical::trajectories::Trajectories;
 use hingecast_geom::Pose;
 use hingecast_geom::ply::{read_vertices, write_float_vertices};
@@ -31,7 +31,12 @@ impl Groups {
     /// # Errors
     /// When the file is missing or not ours.
     pub fn read(run: &Path) -> Result<Self> {
-        read_json(&run.join("parts").join("parts.json"))
+        read_checked(&run.join("parts").join("parts.json"), |groups: &Self| {
+            let states = groups.motions.first().map_or(0, Vec::len);
+            check::labels(&groups.labels, groups.motions.len())?;
+            let rows = &groups.motions;
+            rows.iter().try_for_each(|row| check::as_many("motions of a part", row.len(), "states", states))
+        })
     }
 }
 
@@ -64,6 +69,8 @@ pub fn read_states(at: &Path) -> Result<Trajectories> {
             return Err(Failure::new("not a file of tracked gaussians", place, "build again with --from motion"));
         }
         let rows = table.data.chunks_exact(COLUMNS.len());
+        let first = out.means.first().map_or(rows.len(), Vec::len);
+        checked(&path, check::as_many("gaussians", rows.len(), "gaussians of the first state", first))?;
         out.means.push(rows.clone().map(|r| [r[0], r[1], r[2]]).collect());
         out.quats.push(rows.map(|r| [r[3], r[4], r[5], r[6]]).collect());
     }

@@ -1,11 +1,11 @@
 //! `twin/twin.json` and its meshes, as other verbs need them.
 
+use super::check::{self, Verdict, checked, read_checked};
 use crate::failure::Result;
-use crate::stage::read_json;
 use glam::DVec3;
 use hingecast_geom::{Certainty, KinematicTree, Pose, TriMesh};
 use serde::Deserialize;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 /// The parts of `twin.json` that other verbs need.
 #[derive(Clone, Debug, Deserialize)]
@@ -38,7 +38,28 @@ impl TwinFile {
     /// # Errors
     /// When the file is missing or not ours.
     pub fn read(run: &Path) -> Result<Self> {
-        read_json(&run.join("twin").join("twin.json"))
+        read_checked(&Self::file(run), |twin: &Self| {
+            check::tree(&twin.tree)?;
+            check::as_many("parts", twin.parts.len(), "parts of its tree", twin.tree.parts.len())?;
+            check::finite("the diagonal", &[twin.diagonal])?;
+            twin.parts.iter().try_for_each(|p| check::finite("a link's origin", &p.link_origin))
+        })
+    }
+
+    /// Whether it belongs to a recording of so many states, and to the tree that it was built by.
+    ///
+    /// # Errors
+    /// It does not: files of different builds, or a recording that changed.
+    pub fn fits(&self, run: &Path, n_states: usize, built_by: &KinematicTree) -> Result<()> {
+        let verdict = || -> Verdict {
+            check::states(&self.tree, n_states)?;
+            check::as_many("parts", self.tree.parts.len(), "parts of joints.json", built_by.parts.len())
+        };
+        checked(&Self::file(run), verdict())
+    }
+
+    fn file(run: &Path) -> PathBuf {
+        run.join("twin").join("twin.json")
     }
 
     /// Visual meshes in the canonical world frame.

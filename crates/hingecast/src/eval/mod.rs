@@ -7,7 +7,7 @@ pub mod parts;
 pub mod pictures;
 pub mod surfaces;
 
-use crate::artifacts::TwinFile;
+use crate::artifacts::{Joints, TwinFile};
 use crate::failure::{Failure, Result};
 use crate::stage::{RunFolder, write_json};
 use hingecast_capture::{Recording, Truth, ViewCache};
@@ -63,6 +63,7 @@ pub fn evaluate(run: &Path, truth: &Path, progress: &Progress) -> Result<Evaluat
     let truth = Truth::open(truth)?;
     let twin = TwinFile::read(run)?;
     let recording = recording_of(&folder, &truth)?;
+    twin.fits(run, recording.n_states, &Joints::read(run)?.tree)?;
     let cache = ViewCache::new(&recording, 512 << 20);
 
     // Everything in the reference state, world frame: state 0.

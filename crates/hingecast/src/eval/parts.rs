@@ -36,7 +36,7 @@ pub fn evaluate_parts(run: &Path, truth: &Path) -> Result<PartsEvaluation> {
     let tree = if folder.has("joints") { Joints::read(run)?.tree } else { found.tree };
     let meshes = reference_meshes(&truth)?;
     let true_points = surface_points(&meshes);
-    let found_points = samples::canonical_points(&samples::read(run)?, &tree, POINTS);
+    let found_points = samples::canonical_points(&samples::read(run, &tree)?, &tree, POINTS);
     let matching = match_points(&found_points, &true_points, &tree, &truth.tree);
     Ok(PartsEvaluation {
         object: truth.object.clone(),

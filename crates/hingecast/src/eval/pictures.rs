@@ -55,6 +55,7 @@ pub fn errors(
 ) -> Result<(PictureErrors, PictureErrors)> {
     let gaussians = Splats::read(&run.root)?.gaussians;
     let found = Joints::read(&run.root)?;
+    found.fit(&run.root, recording.n_states, gaussians.len())?;
     let cache = ViewCache::new(recording, 64 << 20);
     let background = targets::background(recording, &cache)?;
     let mut labeller = Labeller::new(&gaussians, &found.labels, run.record.threads)?;

@@ -45,6 +45,8 @@ pub fn write(run: &RunFolder) -> Result<PathBuf> {
     let recording = Recording::open(&run.record.recording)?;
     let Splats { gaussians, extent, .. } = Splats::read(&run.root)?;
     let found = Joints::read(&run.root)?;
+    found.fit(&run.root, recording.n_states, gaussians.len())?;
+    twin.fits(&run.root, recording.n_states, &found.tree)?;
     let cache = ViewCache::new(&recording, 64 << 20);
     let background = targets::background(&recording, &cache)?;
     let mut labeller = Labeller::new(&gaussians, &found.labels, run.record.threads.max(1))?;
@@ -93,7 +95,7 @@ pub fn write(run: &RunFolder) -> Result<PathBuf> {
     let content = Content { twin, overlays, held_out, plot, trace: Parts::read_trace(&run.root) };
     let path = folder.join("index.html");
     let text = html::page(run, &content);
-    hingecast_geom::ply::write_whole(&path, text.as_bytes()).map_err(Failure::io(&path))?;
+    hingecast_geom::staging::write_whole(&path, text.as_bytes()).map_err(Failure::io(&path))?;
     Ok(path)
 }
 

@@ -2,20 +2,18 @@
 
 use super::{Demos, check};
 use crate::{ACTION_SIZE, PolicyError};
+use hingecast_geom::staging::write_through;
 use rust_hdf5::{H5File, H5Group, Hdf5Error};
 use std::path::Path;
 
-/// Writes `demos` to a temporary name and renames it, so that a file is whole or absent.
+/// Writes `demos` out of sight and renames the file into place: it is whole or absent.
 ///
 /// # Errors
 /// Demonstrations that [`super::read()`] would refuse, or a folder that cannot be written.
 pub fn write(path: &Path, demos: &Demos) -> Result<(), PolicyError> {
     check(demos, &path.display().to_string())?;
-    let mut name = path.file_name().unwrap_or_default().to_os_string();
-    name.push(".tmp");
-    let temporary = path.with_file_name(name);
-    write_file(&temporary, demos).map_err(|e| PolicyError::write(path, e))?;
-    std::fs::rename(&temporary, path).map_err(|e| PolicyError::write(path, e))
+    write_through(path, |new| write_file(new, demos).map_err(std::io::Error::other))
+        .map_err(|e: std::io::Error| PolicyError::write(path, e))
 }
 
 fn write_file(path: &Path, demos: &Demos) -> Result<(), Hdf5Error> {

@@ -5,7 +5,7 @@
 use crate::PolicyError;
 use crate::net::{Adam, Network};
 use crate::policy::{not_safetensors, parameters_from, tensors_to_bytes};
-use hingecast_geom::ply::write_whole;
+use hingecast_geom::staging::write_whole;
 use safetensors::tensor::SafeTensors;
 use serde::{Deserialize, Serialize};
 use std::path::Path;

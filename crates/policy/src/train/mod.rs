@@ -23,7 +23,7 @@ use crate::policy::{Policy, PolicyConfig};
 use crate::{Demos, PolicyError};
 use checkpoint::State;
 use hingecast_geom::Progress;
-use hingecast_geom::ply::write_whole;
+use hingecast_geom::staging::write_whole;
 use std::path::Path;
 
 /// Steps whose losses make one record.

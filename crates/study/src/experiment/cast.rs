@@ -135,7 +135,7 @@ impl Cast<'_> {
             Ok(value) => Ok(Ok(value)),
             Err(failure) if failure.cancelled => Err(failure),
             Err(failure) => {
-                self.host.tell_error(&failure);
+                self.host.watcher.complain(&failure);
                 Ok(Err(failure.what))
             }
         }

@@ -6,7 +6,7 @@ use crate::simulate::record::outcome_name;
 use crate::simulate::rollout::{EpisodeResult, WorldResult};
 use hingecast::failure::{Failure, Result};
 use hingecast::report::html::{doubts, escape, head};
-use hingecast_geom::ply::write_whole;
+use hingecast_geom::staging::write_whole;
 use hingecast_policy::statistics::Paired;
 use hingecast_sim::{Outcome, TaskKind, TaskSpec};
 use std::fmt::Write as _;

@@ -7,7 +7,7 @@ use hingecast::config::{Words, layered};
 use hingecast::failure::{Failure, Result};
 use hingecast_geom::Progress;
 use hingecast_geom::folder::may_become;
-use hingecast_geom::ply::write_whole;
+use hingecast_geom::staging::write_whole;
 use hingecast_policy::Demos;
 use hingecast_policy::train::{Preset, TrainConfig, TrainReport};
 use std::path::Path;

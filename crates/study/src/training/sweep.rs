@@ -15,7 +15,7 @@ use super::{plot, resolve, train};
 use hingecast::failure::{Failure, Result};
 use hingecast::stage::write_json;
 use hingecast_geom::Progress;
-use hingecast_geom::ply::write_whole;
+use hingecast_geom::staging::write_whole;
 use hingecast_policy::Demos;
 use hingecast_policy::train::{Preset, TrainConfig};
 use serde::{Deserialize, Serialize};
