@@ -19,7 +19,7 @@ FUZZ_TARGETS ?=
 FUZZ_SECONDS ?= 60
 DENY := third_party/cargo-deny/bin/cargo-deny
 
-.PHONY: help setup build demo test fmt deny clippy doc tests advisories fuzz bench clean
+.PHONY: help setup build demo test fmt circles deny clippy doc tests advisories fuzz bench clean
 
 help:
 	@echo 'make demo    record a sample object (OBJECT=$(OBJECT)), build its twin, write the report'
@@ -29,7 +29,7 @@ help:
 	@echo 'make fuzz    damaged files for every reader, FUZZ_SECONDS=$(FUZZ_SECONDS) in all; FUZZ_TARGETS="ply_mesh urdf" picks'
 	@echo 'make clean   forget what was built; recordings and runs stay'
 	@echo
-	@echo 'one check alone: make fmt | deny | clippy | doc | tests; make advisories asks the network for known holes'
+	@echo 'one check alone: make fmt | circles | deny | clippy | doc | tests; make advisories asks the network for known holes'
 
 # Says what is missing and how to get it; fetches MuJoCo once.
 setup:
@@ -45,6 +45,7 @@ demo: build
 # Cheapest check first.
 test: setup
 	@$(MAKE) --no-print-directory fmt
+	@$(MAKE) --no-print-directory circles
 	@$(MAKE) --no-print-directory deny
 	@$(MAKE) --no-print-directory clippy
 	@$(MAKE) --no-print-directory doc
@@ -53,6 +54,10 @@ test: setup
 fmt:
 	$(CARGO) fmt --all --check
 	$(CARGO) fmt --manifest-path fuzz/Cargo.toml --check
+
+# No file imports in a circle.
+circles:
+	python3 scripts/import_circles.py
 
 # What deny.toml allows, of the programs and of the fuzz targets. Duplicates are warnings there, and not shown.
 deny:
