@@ -1,5 +1,8 @@
 //! The facade: stages, configuration, evaluation, reports and benches behind the `hingecast` binary.
 
+// `ui` writes to the terminal, and nobody else.
+#![deny(clippy::print_stdout, clippy::print_stderr)]
+
 pub mod artifacts;
 pub mod build;
 pub mod chart;

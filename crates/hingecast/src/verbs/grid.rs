@@ -74,7 +74,7 @@ pub fn run(session: &Session, args: &Bench, suite: &[Named]) -> Result<Outcome> 
     session.ui.say(&format!("\n{text}"));
     write_json(&args.out.join("joints.json"), &rows)?;
     let path = args.out.join("joints.md");
-    std::fs::write(&path, &text).map_err(Failure::io(&path))?;
+    hingecast_geom::staging::write_whole(&path, text.as_bytes()).map_err(Failure::io(&path))?;
     session.answer(&rows)?;
     Ok(Outcome::Done)
 }
@@ -100,7 +100,7 @@ fn one(
     }
     let evaluation = evaluate_parts(&run, &Truth::folder_of(&recording))?;
     if tidy {
-        let _ = std::fs::remove_dir_all(&recording);
+        super::suite::tidy(session, &recording);
     }
     Ok(evaluation)
 }

@@ -5,9 +5,10 @@ use crate::cli::Rollout;
 use hingecast::failure::{Failure, Result};
 use hingecast::report::rollout::{self as report, RolloutReport};
 use hingecast::simulate::record::{WorldArgs, world_of};
-use hingecast::simulate::rollout::{World, pictures, rollout, table, world_of_policy};
-use hingecast::simulate::{may_write, object_file, twin_file};
+use hingecast::simulate::rollout::{World, WorldResult, pictures, rollout, table, world_of_policy};
+use hingecast::simulate::{object_file, twin_file};
 use hingecast::stage::write_json;
+use hingecast_geom::folder::may_become;
 use hingecast_policy::Policy;
 use hingecast_policy::demos::read;
 use hingecast_sim::trial::make_task;
@@ -49,8 +50,13 @@ pub fn run(session: &Session, args: &Rollout) -> Result<Outcome> {
     }
 
     if let Some(folder) = &args.out {
+        let hint = "give a new folder: hingecast rollout POLICY -o FOLDER";
+        may_become("rollouts' folder", folder, &["rollout.json"], hint)?;
         std::fs::create_dir_all(folder).map_err(Failure::io(folder))?;
-        may_write(&folder.join("rollout.json"))?;
+        // Marks the folder as ours before pictures are in it: who is killed may go on.
+        if !folder.join("rollout.json").exists() {
+            write_json(&folder.join("rollout.json"), &Vec::<WorldResult>::new())?;
+        }
     }
     let start = std::time::Instant::now();
     let mut results = rollout(&policy, &worlds, args.n, args.seed, &session.ui.stage("rollout"))?;
