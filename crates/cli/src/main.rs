@@ -1,5 +1,8 @@
 //! The `hingecast` binary: flags and glue. Exit 0 done, 1 under the asked bar, 2 error, 130 stopped by Ctrl-C.
 
+// `ui` writes to the terminal, and nobody else.
+#![deny(clippy::print_stdout, clippy::print_stderr)]
+
 mod cli;
 mod ui;
 mod verbs;

@@ -29,6 +29,8 @@
 //! `examples/find_joints.rs`.
 
 #![warn(missing_docs)]
+// `ui` writes to the terminal, and nobody else.
+#![deny(clippy::print_stdout, clippy::print_stderr)]
 
 pub mod artifacts;
 pub mod build;

@@ -1,7 +1,7 @@
 //! Parts and joints of every object of a suite under every protocol and seed, without meshes.
 
 use crate::host::Host;
-use crate::suite::{Named, record_once};
+use crate::suite::{Named, record_once, tidy};
 use hingecast::artifacts::Parts;
 use hingecast::build::{Options, Stage};
 use hingecast::config::Config;
@@ -116,7 +116,7 @@ fn one(
     }
     let evaluation = evaluate_parts(&run, &Truth::folder_of(&recording))?;
     if request.tidy {
-        let _ = std::fs::remove_dir_all(&recording);
+        tidy(host, &recording);
     }
     Ok(evaluation)
 }

@@ -4,7 +4,8 @@ use crate::host::Host;
 use hingecast::failure::{Failure, Result};
 use hingecast::stage::write_json;
 use hingecast_capture::object::ArticulatedObject;
-use hingecast_capture::synth::{SynthConfig, SynthReport, synth};
+use hingecast_capture::synth::{SynthConfig, SynthReport, may_be_replaced, synth};
+use hingecast_geom::staging::remove_folder;
 use std::path::{Path, PathBuf};
 
 /// An object of a suite.
@@ -87,14 +88,43 @@ pub fn record(host: &Host, object: &str, config: &SynthConfig, out: &Path) -> Re
 
 /// Records, unless the same object lies there recorded with the same settings.
 pub fn record_once(host: &Host, argument: &str, config: &SynthConfig, recording: &Path) -> Result<()> {
-    let note = recording.with_extension("synth.json");
+    let note = note_of(recording);
     let settings = serde_json::to_value(config).expect("plain data");
     let noted: Option<serde_json::Value> = std::fs::read(&note).ok().and_then(|b| serde_json::from_slice(&b).ok());
     if noted.as_ref() == Some(&settings) && recording.join("transforms.json").exists() {
         return Ok(());
     }
+    // The old note must not stand beside the new recording, should this be killed between the two.
+    if note.exists() {
+        std::fs::remove_file(&note).map_err(Failure::io(&note))?;
+    }
     record(host, argument, config, recording)?;
     write_json(&note, &settings)
+}
+
+/// Deletes what [`record_once`] recorded. A folder without its note, or one that holds anything else, stays: a recording may have been
+/// refused just because of what lies there.
+pub fn tidy(host: &Host, recording: &Path) {
+    let note = note_of(recording);
+    if !note.is_file() || !recording.is_dir() {
+        return;
+    }
+    let removed = may_be_replaced(recording)
+        .map_err(Failure::from)
+        .and_then(|()| remove_folder(recording).map_err(Failure::io(recording)));
+    match removed {
+        Ok(()) => {
+            let _ = std::fs::remove_file(note);
+        }
+        Err(failure) => host.watcher.say(&format!("kept {}: {}", recording.display(), failure.what)),
+    }
+}
+
+/// The settings that a recording was made with, beside it.
+fn note_of(recording: &Path) -> PathBuf {
+    let mut name = recording.file_name().unwrap_or_default().to_os_string();
+    name.push(".synth.json");
+    recording.with_file_name(name)
 }
 
 #[cfg(test)]

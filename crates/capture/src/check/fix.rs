@@ -121,13 +121,21 @@ pub fn fix(path: &Path, report: &CheckReport) -> Result<Vec<String>, CaptureErro
     Ok(done)
 }
 
-/// The first backup is the original and stays.
+/// A copy beside the file: `.bak`, or `.bak2` and so on where a file of that name is another's or another time's. None is written over.
 fn backup(file: &Path) -> Result<(), CaptureError> {
-    let kept = file.with_extension("json.bak");
-    if kept.exists() {
-        return Ok(());
-    }
-    std::fs::copy(file, &kept).map(|_| ()).map_err(|e| CaptureError::write(&kept, e))
+    let text = std::fs::read(file).map_err(|e| CaptureError::read(file, e))?;
+    let kept = free(
+        &text,
+        (1..).map(|n| file.with_extension(if n == 1 { "json.bak".into() } else { format!("json.bak{n}") })),
+    );
+    images::write_file(&kept, &text)
+}
+
+/// The first of the names that is free, or has this content already.
+fn free(content: &[u8], mut names: impl Iterator<Item = PathBuf>) -> PathBuf {
+    let taken =
+        |path: &PathBuf| path.symlink_metadata().is_ok() && std::fs::read(path).ok().as_deref() != Some(content);
+    names.find(|path| !taken(path)).expect("there are more numbers than files")
 }
 
 /// The frames of a document; the reader made sure that there is a list.
@@ -179,9 +187,11 @@ fn invert_mask(frame: &mut Value, folder: &Path) -> Result<String, CaptureError>
     let image = images::read(&folder.join(&name))?.into_luma8();
     let top = image.iter().max().copied().unwrap_or(255);
     let inverted: Vec<u8> = image.iter().map(|&v| if v > top / 2 { 0 } else { 255 }).collect();
-    let new = Path::new(&name).with_extension("inverted.png");
-    images::write_gray(&folder.join(&new), &inverted, image.width() as usize, image.height() as usize)?;
-    let new = new.to_string_lossy().replace('\\', "/");
+    let png = images::gray_png(&inverted, image.width() as usize, image.height() as usize)?;
+    let names = (1..).map(|n| if n == 1 { "inverted.png".into() } else { format!("inverted{n}.png") });
+    let path = free(&png, names.map(|end| folder.join(Path::new(&name).with_extension(end))));
+    images::write_file(&path, &png)?;
+    let new = path.strip_prefix(folder).unwrap_or(&path).to_string_lossy().replace('\\', "/");
     frame["mask_path"] = json!(new);
     Ok(format!("{name} inverted into {new}"))
 }

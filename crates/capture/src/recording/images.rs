@@ -102,6 +102,11 @@ pub fn write_gray(path: &Path, pixels: &[u8], w: usize, h: usize) -> Result<(), 
     write_png(path, pixels, w, h, ExtendedColorType::L8)
 }
 
+/// What [`write_gray`] would write.
+pub fn gray_png(pixels: &[u8], w: usize, h: usize) -> Result<Vec<u8>, CaptureError> {
+    png(pixels, w, h, ExtendedColorType::L8).map_err(|e| CaptureError::write(Path::new("a mask"), e))
+}
+
 /// RGB 8-bit PNG, fast compression.
 ///
 /// # Errors
@@ -121,10 +126,16 @@ pub fn write_depth(path: &Path, pixels: &[u16], w: usize, h: usize) -> Result<()
 }
 
 fn write_png(path: &Path, bytes: &[u8], w: usize, h: usize, color: ExtendedColorType) -> Result<(), CaptureError> {
+    let out = png(bytes, w, h, color).map_err(|e| CaptureError::write(path, e))?;
+    write_quick(path, &out).map_err(|e| CaptureError::write(path, e))
+}
+
+/// The bytes of a PNG file.
+fn png(bytes: &[u8], w: usize, h: usize, color: ExtendedColorType) -> image::ImageResult<Vec<u8>> {
     let mut out = Vec::with_capacity(bytes.len() / 2 + 1024);
     let encoder = PngEncoder::new_with_quality(&mut out, CompressionType::Fast, FilterType::Adaptive);
-    encoder.write_image(bytes, w as u32, h as u32, color).map_err(|e| CaptureError::write(path, e))?;
-    write_quick(path, &out).map_err(|e| CaptureError::write(path, e))
+    encoder.write_image(bytes, w as u32, h as u32, color)?;
+    Ok(out)
 }
 
 /// Writes a file that is whole or absent, also after a power cut.

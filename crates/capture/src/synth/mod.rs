@@ -20,6 +20,7 @@ mod staging;
 pub use config::{Noise, SynthConfig, SynthReport};
 pub use ranges::{UsefulRange, useful_ranges};
 pub(crate) use staging::Staging;
+pub use staging::may_be_replaced;
 
 use crate::object::{ArticulatedObject, PartGeometry};
 use crate::{CaptureError, Frame, Recording, Split, Truth};

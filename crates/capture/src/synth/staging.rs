@@ -36,8 +36,11 @@ impl Staging {
     }
 }
 
-/// `transforms.json` alone is no proof: captures of people have one as well, beside pictures that nobody can take again.
-fn may_be_replaced(target: &Path) -> Result<(), CaptureError> {
+/// Whether a recording or a truth may be written at `target`, and what is there deleted: it is new, empty, or what we wrote before.
+///
+/// # Errors
+/// It holds something else. `transforms.json` alone is no proof: captures of people have one as well, beside pictures that nobody can take again.
+pub fn may_be_replaced(target: &Path) -> Result<(), CaptureError> {
     may_become("output folder", target, &["transforms.json", "truth.json"], HINT)?;
     may_be_emptied(
         "output folder",

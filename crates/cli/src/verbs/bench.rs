@@ -2,18 +2,22 @@
 
 use super::{Outcome, Session, build, synth, table};
 use crate::cli::Bench;
+use hingecast::eval::parts::PartsEvaluation;
 use hingecast::eval::{Evaluation, evaluate};
 use hingecast::failure::{Failure, Result};
 use hingecast::report;
 use hingecast::stage::{RunFolder, read_json, write_json};
 use hingecast_capture::Truth;
 use hingecast_capture::synth::SynthConfig;
+use hingecast_geom::folder::may_become;
+use hingecast_geom::staging::write_whole;
 use hingecast_study::grid::{self, Request};
-use hingecast_study::suite::{Named, objects, record_once};
+use hingecast_study::suite::{Named, objects, record_once, tidy};
 use std::path::Path;
 
 pub fn run(session: &Session, args: &Bench) -> Result<Outcome> {
     let suite = objects(&args.suite)?;
+    claim(&args.out, if args.joints { "joints.json" } else { "bench.json" })?;
     if args.joints {
         return joints(session, args, &suite);
     }
@@ -34,14 +38,14 @@ pub fn run(session: &Session, args: &Bench) -> Result<Outcome> {
             Err(failure) => session.ui.complain(&failure),
         }
         if args.tidy {
-            let _ = std::fs::remove_dir_all(&recording);
+            tidy(&session.host(), &recording);
         }
     }
     let text = table::overview(&evaluations);
     session.ui.say(&format!("\n{text}"));
     write_json(&args.out.join("bench.json"), &evaluations)?;
     let path = args.out.join("bench.md");
-    std::fs::write(&path, &text).map_err(Failure::io(&path))?;
+    write_whole(&path, text.as_bytes()).map_err(Failure::io(&path))?;
     session.answer(&evaluations)?;
     let mut outcome = if evaluations.len() < suite.len() { Outcome::UnderBar } else { Outcome::Done };
     if let Some(before) = &before {
@@ -70,9 +74,28 @@ fn joints(session: &Session, args: &Bench, suite: &[Named]) -> Result<Outcome> {
     session.ui.say(&format!("\n{text}"));
     write_json(&args.out.join("joints.json"), &rows)?;
     let path = args.out.join("joints.md");
-    std::fs::write(&path, &text).map_err(Failure::io(&path))?;
+    write_whole(&path, text.as_bytes()).map_err(Failure::io(&path))?;
     session.answer(&rows)?;
     Ok(Outcome::Done)
+}
+
+/// Makes sure that the folder is new, empty, or one of ours, and marks it as such before anything is in it.
+fn claim(out: &Path, file: &str) -> Result<()> {
+    let hint = "give a new folder: hingecast bench SUITE -o FOLDER";
+    let before = ["bench.json", "joints.json"].map(|name| out.join(name));
+    let ours = |path: &&std::path::PathBuf| {
+        let evaluations = || read_json::<Vec<Evaluation>>(path).is_ok();
+        path.is_file() && (evaluations() || read_json::<Vec<PartsEvaluation>>(path).is_ok())
+    };
+    if !before.iter().any(|path| ours(&path)) {
+        may_become("bench folder", out, &[], hint)?;
+    }
+    let mark = out.join(file);
+    if !mark.exists() {
+        std::fs::create_dir_all(out).map_err(Failure::io(out))?;
+        write_json(&mark, &Vec::<Evaluation>::new())?;
+    }
+    Ok(())
 }
 
 fn one(

@@ -137,8 +137,14 @@ fn inspect(session: &Session, file: &Path) -> Result<Outcome> {
         ));
     }
     let svg = file.with_extension("svg");
-    write_whole(&svg, replay::plot(&demos).as_bytes()).map_err(Failure::io(&svg))?;
-    session.ui.say(&format!("plot: {}", svg.display()));
+    let there = std::fs::read_to_string(&svg);
+    if there.as_ref().map_or(!svg.exists(), |text| text.is_empty() || text.contains(replay::HEIGHT)) {
+        write_whole(&svg, replay::plot(&demos).as_bytes()).map_err(Failure::io(&svg))?;
+        session.ui.say(&format!("plot: {}", svg.display()));
+    } else {
+        // Nobody named this file; a drawing of a person's stays.
+        session.ui.say(&format!("no plot: {} is another picture", svg.display()));
+    }
     let world = record::world_of(&demos, file)?;
     let replayed = replay::replay(&demos, &world, &session.ui.stage("replay"))?;
     session.ui.say(&format!(

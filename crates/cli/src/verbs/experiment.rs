@@ -19,6 +19,10 @@ pub fn run(session: &Session, args: &cli::Experiment) -> Result<Outcome> {
     Experiment::may_become(&args.out)?;
     std::fs::create_dir_all(&args.out).map_err(Failure::io(&args.out))?;
     let mut experiment = Experiment { settings: plan.settings(), demonstrated: Vec::new(), rows: Vec::new() };
+    // Marks the folder as ours before anything is in it: who is killed with the first object may go on.
+    if !args.out.join("experiment.json").exists() {
+        save(&experiment, &args.out)?;
+    }
     let mut clock = Clock::new(plan.steps(), objects.len());
     for Named { argument, name } in &objects {
         clock.next_object();

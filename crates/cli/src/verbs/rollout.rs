@@ -4,14 +4,15 @@ use super::{Outcome, Session};
 use crate::cli::Rollout;
 use hingecast::failure::{Failure, Result};
 use hingecast::stage::write_json;
+use hingecast_geom::folder::may_become;
 use hingecast_policy::Policy;
 use hingecast_policy::demos::read;
 use hingecast_sim::trial::make_task;
 use hingecast_sim::{Scene, SceneConfig, Spoil, TaskKind, TaskSpec};
 use hingecast_study::report::rollout::{self as report, RolloutReport};
 use hingecast_study::simulate::record::{WorldArgs, world_of};
-use hingecast_study::simulate::rollout::{World, pictures, rollout, table, world_of_policy};
-use hingecast_study::simulate::{may_write, object_file, twin_file};
+use hingecast_study::simulate::rollout::{World, WorldResult, pictures, rollout, table, world_of_policy};
+use hingecast_study::simulate::{object_file, twin_file};
 use std::path::Path;
 
 pub fn run(session: &Session, args: &Rollout) -> Result<Outcome> {
@@ -49,8 +50,13 @@ pub fn run(session: &Session, args: &Rollout) -> Result<Outcome> {
     }
 
     if let Some(folder) = &args.out {
+        let hint = "give a new folder: hingecast rollout POLICY -o FOLDER";
+        may_become("rollouts' folder", folder, &["rollout.json"], hint)?;
         std::fs::create_dir_all(folder).map_err(Failure::io(folder))?;
-        may_write(&folder.join("rollout.json"))?;
+        // Marks the folder as ours before pictures are in it: who is killed may go on.
+        if !folder.join("rollout.json").exists() {
+            write_json(&folder.join("rollout.json"), &Vec::<WorldResult>::new())?;
+        }
     }
     let start = std::time::Instant::now();
     let mut results = rollout(&policy, &worlds, args.n, args.seed, &session.ui.stage("rollout"))?;

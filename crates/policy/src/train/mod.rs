@@ -23,6 +23,7 @@ use crate::policy::{Policy, PolicyConfig};
 use crate::{Demos, PolicyError};
 use checkpoint::State;
 use hingecast_geom::Progress;
+use hingecast_geom::folder::may_be_emptied;
 use hingecast_geom::staging::write_whole;
 use std::path::Path;
 
@@ -155,6 +156,11 @@ fn stamp(config: &TrainConfig, data: &Dataset) -> String {
 
 /// Removes what an earlier training of other settings left, so that nothing old passes for new.
 fn forget(folder: &Path) -> Result<(), PolicyError> {
+    let snapshot = |path: &Path| {
+        let names: Vec<&str> = path.iter().filter_map(|name| name.to_str()).collect();
+        matches!(names[..], [step, "policy.json" | "policy.safetensors"] if step.starts_with("step_"))
+    };
+    may_be_emptied("policy's folder", &folder.join("snapshots"), &snapshot, "move it elsewhere, or give a new folder")?;
     let files = ["checkpoint.safetensors", "losses.csv", "policy.json", "policy.safetensors"];
     let files = files.map(|name| (folder.join(name), false));
     for (path, is_folder) in files.into_iter().chain([(folder.join("snapshots"), true)]) {

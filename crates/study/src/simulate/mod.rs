@@ -39,6 +39,5 @@ fn absolute(path: &Path) -> Result<PathBuf> {
 /// # Errors
 /// When it cannot.
 pub fn may_write(file: &Path) -> Result<()> {
-    let probe = file.with_extension("probe.tmp");
-    std::fs::write(&probe, b"").and_then(|()| std::fs::remove_file(&probe)).map_err(Failure::io(file))
+    hingecast_geom::staging::probe(file).map_err(Failure::io(file))
 }

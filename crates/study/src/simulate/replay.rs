@@ -80,6 +80,9 @@ fn one(env: &mut Env, episode: &Episode, index: usize) -> Result<(Option<usize>,
     Ok((difference, env.success()))
 }
 
+/// Stands in every plot, and tells it from other pictures.
+pub const HEIGHT: &str = "gripper height, m";
+
 /// Height of the gripper over time, every episode a line: pauses, speeds and second tries show.
 pub fn plot(demos: &Demos) -> String {
     let key = "robot0_eef_pos";
@@ -104,7 +107,7 @@ pub fn plot(demos: &Demos) -> String {
             .x_label_area_size(32)
             .y_label_area_size(52)
             .build_cartesian_2d(0.0..longest, lo..hi)?;
-        chart.configure_mesh().x_desc("s").y_desc("gripper height, m").light_line_style(WHITE).draw()?;
+        chart.configure_mesh().x_desc("s").y_desc(HEIGHT).light_line_style(WHITE).draw()?;
         for line in &lines {
             chart.draw_series(LineSeries::new(line.iter().copied(), BLUE.mix(0.25)))?;
         }
