@@ -63,7 +63,7 @@ circles:
 deny:
 	@CARGO='$(CARGO)' scripts/fetch_cargo_deny.sh
 	$(DENY) --log-level error --locked check licenses bans sources
-	$(DENY) --log-level error --locked --manifest-path fuzz/Cargo.toml check --config deny.toml licenses bans sources
+	$(DENY) --log-level error --locked --manifest-path fuzz/Cargo.toml --config deny.toml check licenses bans sources
 
 # Known security holes: a list that changes daily, so no change of ours is held against it.
 advisories:
