@@ -114,10 +114,14 @@ pub fn may_empty_run(root: &Path) -> Result<()> {
 }
 
 /// Whether nothing but the beginning of a build that was killed is in `root`; also where there is no such folder.
-pub fn is_bare(root: &Path) -> bool {
+///
+/// # Errors
+/// It is no folder, or one that cannot be read.
+pub fn is_bare(root: &Path) -> Result<bool> {
     match std::fs::read_dir(root) {
-        Ok(entries) => entries.flatten().all(|e| e.file_name() == LOCK || is_temporary(&e.file_name())),
-        Err(e) => e.kind() == std::io::ErrorKind::NotFound,
+        Ok(entries) => Ok(entries.flatten().all(|e| e.file_name() == LOCK || is_temporary(&e.file_name()))),
+        Err(e) if e.kind() == std::io::ErrorKind::NotFound => Ok(true),
+        Err(e) => Err(Failure::io(root)(e)),
     }
 }
 
@@ -178,6 +182,6 @@ mod tests {
         assert!(refused.contains("another build") && refused.lines().count() == 3, "{refused}");
         drop(first);
         RunLock::take(dir.path()).unwrap();
-        assert!(is_bare(dir.path()));
+        assert!(is_bare(dir.path()).unwrap());
     }
 }

@@ -58,7 +58,7 @@ impl RunFolder {
     /// # Errors
     /// It holds something else.
     pub fn may_become_run(root: &Path) -> Result<()> {
-        if Self::read(root).is_some() || run_files::is_bare(root) {
+        if Self::read(root).is_some() || run_files::is_bare(root)? {
             return Ok(());
         }
         let hint = "give a new folder: hingecast build RECORDING -o RUN";
