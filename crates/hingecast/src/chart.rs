@@ -4,7 +4,9 @@ use plotters::coord::Shift;
 use plotters::prelude::*;
 use std::error::Error;
 
+/// What is drawn on: an SVG text.
 pub type Area<'a> = DrawingArea<SVGBackend<'a>, Shift>;
+/// Of a drawing function.
 pub type Drawn = Result<(), Box<dyn Error>>;
 
 /// The SVG that `draw` paints on white, width x height in pixels.
@@ -23,6 +25,7 @@ pub fn svg(size: (u32, u32), draw: impl FnOnce(&Area) -> Drawn) -> String {
     out
 }
 
+/// 8-bit sRGB as the plotting library has it.
 pub fn color([r, g, b]: [u8; 3]) -> RGBColor {
     RGBColor(r, g, b)
 }

@@ -7,16 +7,19 @@ use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
 use std::path::Path;
 
+/// How much time a build may take.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Preset {
     /// A look within a minute or two.
     Fast,
+    /// 24 k gaussians, 4000 steps.
     Default,
     /// More gaussians, more steps.
     Best,
 }
 
+/// How parts and joints are found.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Method {
@@ -30,17 +33,27 @@ pub enum Method {
 #[derive(Clone, Debug, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct Config {
+    /// How parts and joints are found.
     pub method: Method,
+    /// What the rest is measured from.
     pub preset: Preset,
+    /// Seed of everything random.
     pub seed: u64,
     /// Decoded images kept in memory, MB.
     pub memory_mb: usize,
+    /// The gaussians.
     pub fit: Fit,
+    /// The search for parts and joints.
     pub screw: articulate::Config,
+    /// Which passes of it are left out.
     pub passes: Passes,
+    /// Tracking, by `--method track` alone.
     pub track: articulate::classical::track::Config,
+    /// Grouping, by `--method track` alone.
     pub parts: articulate::classical::segment::Config,
+    /// Axes, by `--method track` alone.
     pub joints: articulate::classical::joints::Config,
+    /// Meshes, masses, collision pieces.
     pub twin: hingecast_twin::Config,
     /// A person's corrections.
     pub joint: Vec<JointOverride>,
@@ -54,6 +67,7 @@ pub struct Passes {
     pub skip: Vec<String>,
 }
 
+/// The fit of gaussians.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct Fit {
@@ -89,6 +103,7 @@ impl Default for Config {
 }
 
 impl Config {
+    /// The settings of a preset.
     pub fn preset(preset: Preset) -> Self {
         let mut c = Self { preset, ..Default::default() };
         match preset {

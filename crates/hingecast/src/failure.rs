@@ -6,15 +6,21 @@ use std::path::Path;
 /// Three lines on stderr; exit code 2, or 130 when the person stopped it.
 #[derive(Debug, Clone)]
 pub struct Failure {
+    /// What is wrong.
     pub what: String,
+    /// File, field or value.
     pub place: String,
+    /// What to try.
     pub hint: String,
+    /// Whether a person stopped it.
     pub cancelled: bool,
 }
 
+/// What fails with three lines.
 pub type Result<T> = std::result::Result<T, Failure>;
 
 impl Failure {
+    /// The three lines: what, where, what to try.
     pub fn new(what: impl Into<String>, place: impl Into<String>, hint: impl Into<String>) -> Self {
         Self { what: what.into(), place: place.into(), hint: hint.into(), cancelled: false }
     }

@@ -26,6 +26,7 @@ const CRUMB: f64 = 0.01;
 /// The most details of a part that get pieces of their own, largest first.
 const MOST_DETAILS: usize = 24;
 
+/// How an object is made fit for the simulator.
 #[derive(Clone, Copy, Debug, Serialize)]
 pub struct ImportConfig {
     /// Units of the new files per unit of the old one.
@@ -40,12 +41,18 @@ impl Default for ImportConfig {
     }
 }
 
+/// What was written.
 #[derive(Clone, Debug, Serialize)]
 pub struct Imported {
+    /// Number of parts, the base included.
     pub parts: usize,
+    /// Names of the joints.
     pub joints: Vec<String>,
+    /// Convex pieces of all parts.
     pub hulls: usize,
+    /// Of all parts, kg.
     pub mass: f64,
+    /// Of the object, scene units.
     pub diagonal: f64,
     /// What is not as in the source, as sentences.
     pub changes: Vec<String>,

@@ -16,6 +16,7 @@ pub struct JointOverride {
     /// New name.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub name: Option<String>,
+    /// Another type.
     #[serde(rename = "type", skip_serializing_if = "Option::is_none")]
     pub kind: Option<JointKind>,
     /// Direction, world frame, any length.

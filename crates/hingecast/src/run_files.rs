@@ -22,6 +22,7 @@ const HINT: &str = "move it elsewhere, or give a new folder: hingecast build REC
 pub struct FileRecord {
     /// From the stage's folder, with slashes.
     pub name: String,
+    /// Length of the file.
     pub bytes: u64,
     /// XXH3 of the content, 32 hex digits. The whole of it: 60 MB take some 10 ms where the system has just read or written them.
     pub xxh3: String,

@@ -15,8 +15,11 @@ const FORMAT: u32 = 9;
 /// Name, time and memory of one finished stage.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct StageRecord {
+    /// As in the run folder.
     pub name: String,
+    /// Of everything that the stage depends on.
     pub stamp: String,
+    /// Wall time.
     pub secs: f64,
     /// Peak resident memory of the process when the stage ended, bytes.
     pub peak_memory: u64,
@@ -28,26 +31,37 @@ pub struct StageRecord {
 /// `run.json`.
 #[derive(Clone, Debug, Default, Serialize, Deserialize)]
 pub struct RunRecord {
+    /// Version of hingecast that ran last.
     pub version: String,
+    /// Whole path of the recording.
     pub recording: PathBuf,
+    /// Of the recording, hex.
     pub fingerprint: String,
+    /// Worker threads of the last build.
     pub threads: usize,
+    /// Finished stages in order.
     pub stages: Vec<StageRecord>,
+    /// Of the twin, gravest first.
     pub doubts: Vec<String>,
 }
 
 impl RunRecord {
+    /// Wall time of all stages together.
     pub fn total_secs(&self) -> f64 {
         self.stages.iter().map(|s| s.secs).sum()
     }
 
+    /// Peak resident memory over all stages, bytes.
     pub fn peak_memory(&self) -> u64 {
         self.stages.iter().map(|s| s.peak_memory).max().unwrap_or(0)
     }
 }
 
+/// A run folder, and what it remembers.
 pub struct RunFolder {
+    /// The folder.
     pub root: PathBuf,
+    /// `run.json`
     pub record: RunRecord,
 }
 
@@ -110,6 +124,7 @@ impl RunFolder {
         serde_json::from_slice(&std::fs::read(root.join("run.json")).ok()?).ok()
     }
 
+    /// The folder of a stage.
     pub fn folder(&self, stage: &str) -> PathBuf {
         self.root.join(stage)
     }
@@ -164,6 +179,10 @@ impl RunFolder {
         self.save()
     }
 
+    /// Writes `run.json`.
+    ///
+    /// # Errors
+    /// When it cannot be written.
     pub fn save(&self) -> Result<()> {
         write_json(&self.root.join("run.json"), &self.record)
     }
@@ -199,7 +218,9 @@ pub fn stamp(parts: &[&dyn erased::Json]) -> String {
 
 /// serde's `Serialize` cannot be a trait object; its JSON can.
 pub mod erased {
+    /// Whatever has a JSON text.
     pub trait Json {
+        /// The text.
         fn json(&self) -> Vec<u8>;
     }
 
@@ -210,11 +231,19 @@ pub mod erased {
     }
 }
 
+/// Writes a value as JSON; the file is whole or absent.
+///
+/// # Errors
+/// When it cannot be written.
 pub fn write_json<T: Serialize>(path: &Path, value: &T) -> Result<()> {
     let text = serde_json::to_string_pretty(value).expect("plain data") + "\n";
     write_whole(path, text.as_bytes()).map_err(Failure::io(path))
 }
 
+/// Reads a value from JSON.
+///
+/// # Errors
+/// The file is missing, or not what this program writes.
 pub fn read_json<T: for<'a> Deserialize<'a>>(path: &Path) -> Result<T> {
     let bytes = std::fs::read(path).map_err(Failure::io(path))?;
     serde_json::from_slice(&bytes).map_err(|e| {

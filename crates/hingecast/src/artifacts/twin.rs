@@ -10,25 +10,39 @@ use std::path::{Path, PathBuf};
 /// The parts of `twin.json` that other verbs need.
 #[derive(Clone, Debug, Deserialize)]
 pub struct TwinFile {
+    /// Of the recording.
     pub name: String,
+    /// Of the object's box in the first state, scene units.
     pub diagonal: f64,
+    /// Parts and joints, with values of all states.
     pub tree: KinematicTree,
+    /// Gravest first.
     pub doubts: Vec<String>,
     /// Of each joint, in the tree's order; older runs do not say.
     #[serde(default)]
     pub certainty: Vec<Option<Certainty>>,
+    /// In the tree's order.
     pub parts: Vec<PartFile>,
 }
 
+/// One part's files and figures.
 #[derive(Clone, Debug, Deserialize)]
 pub struct PartFile {
+    /// As in the tree.
     pub name: String,
+    /// Origin of its link's frame, canonical world, scene units.
     pub link_origin: [f64; 3],
+    /// OBJ below the twin's folder; a PLY lies beside it.
     pub visual: String,
+    /// Convex pieces below the twin's folder.
     pub collision: Vec<String>,
+    /// kg, or density times cubed scene units.
     pub mass: f64,
+    /// Cubed scene units.
     pub volume: f64,
+    /// Edges of the visual mesh with one face; 0 = closed.
     pub open_edges: usize,
+    /// Of the visual mesh.
     pub faces: usize,
 }
 

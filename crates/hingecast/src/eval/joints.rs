@@ -4,13 +4,18 @@ use glam::DVec3;
 use hingecast_geom::{Joint, JointKind, KinematicTree, Pose, Screw, TriMesh};
 use serde::{Deserialize, Serialize};
 
+/// How far off the joint of one true part is.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct JointErrors {
+    /// Of the true joint.
     pub name: String,
+    /// Of the true joint.
     pub true_type: JointKind,
     /// `None` when no part was matched: every error is then the miss value of metrics.md.
     pub found_type: Option<JointKind>,
+    /// Whether the found joint has the true type.
     pub type_right: bool,
+    /// Angle between the axes, 0 to 90 degrees.
     pub axis_deg: f64,
     /// Published tables' unit: 10 x scene units. Hinges only.
     pub axis_pos: Option<f64>,
@@ -18,6 +23,7 @@ pub struct JointErrors {
     pub pivot: Option<f64>,
     /// Over all pairs (first state, state s): degrees for hinges, scene units for slides.
     pub motion_mean: f64,
+    /// The largest over the states.
     pub motion_max: f64,
     /// Mean |(q_p(s) - q_p(0)) - (q_g(s) - q_g(0))|, deg or scene units.
     pub state_mean: f64,
@@ -25,6 +31,7 @@ pub struct JointErrors {
     pub range_error: f64,
     /// Mean and largest distance between points of the part on the found and the true path over the shown range.
     pub sweep_mean: f64,
+    /// The largest on the way.
     pub sweep_max: f64,
 }
 

@@ -18,24 +18,36 @@ use std::path::Path;
 /// `eval.json`. Lengths in scene units, angles in degrees, Chamfer in 1e-3 square scene units.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct Evaluation {
+    /// Name of the object.
     pub object: String,
+    /// Of the true object, scene units.
     pub diagonal: f64,
+    /// The base counts.
     pub true_parts: usize,
+    /// The base counts.
     pub found_parts: usize,
     /// Share of true joints whose matched joint has the right type.
     pub joint_type_accuracy: f64,
     /// Share of true parts whose parent is right.
     pub tree_accuracy: f64,
+    /// One of each true joint.
     pub joints: Vec<joints::JointErrors>,
+    /// One of each true part.
     pub surfaces: Vec<surfaces::SurfaceErrors>,
+    /// Held-out pictures of the first state.
     pub first_state: pictures::PictureErrors,
+    /// Held-out pictures of all others.
     pub other_states: pictures::PictureErrors,
+    /// Sum over the stages.
     pub build_secs: f64,
+    /// Peak of the process that built, GB.
     pub peak_memory_gb: f64,
+    /// Of the twin, gravest first.
     pub doubts: Vec<String>,
 }
 
 impl Evaluation {
+    /// Whether as many parts were found as there are.
     pub fn parts_right(&self) -> bool {
         self.true_parts == self.found_parts
     }
@@ -44,6 +56,7 @@ impl Evaluation {
         self.joints.iter().filter_map(pick).collect()
     }
 
+    /// The largest angle between a true and a found axis, degrees.
     pub fn axis_max(&self) -> f64 {
         self.over(|j| Some(j.axis_deg)).into_iter().fold(0.0, f64::max)
     }

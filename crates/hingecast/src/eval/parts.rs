@@ -13,13 +13,19 @@ use std::path::Path;
 /// One recording of one object.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct PartsEvaluation {
+    /// Name of the object.
     pub object: String,
+    /// The base counts.
     pub true_parts: usize,
+    /// The base counts.
     pub found_parts: usize,
     /// Share of true parts whose parent is right.
     pub tree_accuracy: f64,
+    /// One of each true joint.
     pub joints: Vec<JointErrors>,
+    /// Of the stages that ran.
     pub secs: f64,
+    /// Gravest first.
     pub doubts: Vec<String>,
 }
 

@@ -10,8 +10,10 @@ use serde::{Deserialize, Serialize};
 /// Samples per mesh, as in the published tables.
 const SAMPLES: usize = 10_000;
 
+/// How far off the surface of one true part is.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct SurfaceErrors {
+    /// Name of the true part.
     pub part: String,
     /// CD of the whole mesh; the miss value when nothing was matched.
     pub chamfer: f64,
@@ -19,10 +21,13 @@ pub struct SurfaceErrors {
     pub floor: f64,
     /// CD restricted to surface that some camera of some state sees.
     pub visible_chamfer: f64,
+    /// The same of two samplings of the truth.
     pub visible_floor: f64,
     /// F-score, precision and recall at 1 % of the diagonal, visible surface.
     pub f_score: f64,
+    /// Share of found points near true surface.
     pub precision: f64,
+    /// Share of true points near found surface.
     pub recall: f64,
 }
 

@@ -17,10 +17,12 @@ pub const PALETTE: [[u8; 3]; 8] = [
     [0, 114, 178],
 ];
 
+/// A picture from 8-bit sRGB, (h, w, 3).
 pub fn from_rgb8(rgb: &[u8], width: usize, height: usize) -> RgbImage {
     RgbImage::from_raw(width as u32, height as u32, rgb.to_vec()).expect("h x w x 3 bytes")
 }
 
+/// A picture from sRGB in 0..1, (h, w, 3).
 pub fn from_rgb_f32(rgb: &[f32], width: usize, height: usize) -> RgbImage {
     let bytes: Vec<u8> = rgb.iter().map(|x| (x.clamp(0.0, 1.0) * 255.0).round() as u8).collect();
     from_rgb8(&bytes, width, height)

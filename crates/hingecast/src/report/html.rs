@@ -52,6 +52,7 @@ pub(crate) fn page(run: &RunFolder, content: &Content) -> String {
     out + "</html>\n"
 }
 
+/// The box of doubts, or the one that says that there are none.
 pub fn doubts(out: &mut String, doubts: &[String]) {
     if doubts.is_empty() {
         let _ = write!(out, "<div class=\"fine\">No doubts were found. That is not proof: look at the pictures.</div>");
@@ -196,6 +197,7 @@ fn time(out: &mut String, run: &RunFolder) {
     );
 }
 
+/// Text as HTML shows it.
 pub fn escape(text: &str) -> String {
     text.replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;").replace('"', "&quot;")
 }

@@ -18,12 +18,17 @@ pub struct Picture {
     pub rgb: Vec<f32>,
     /// Median depth, scene units, 0 = nothing.
     pub depth: Vec<f32>,
+    /// 0..1
     pub alpha: Vec<f32>,
     /// Part, [`BACKGROUND`] = nothing.
     pub parts: Vec<u8>,
 }
 
 impl Labeller {
+    /// `labels`: the part of every gaussian.
+    ///
+    /// # Errors
+    /// Those of the engine.
     pub fn new(gaussians: &Gaussians, labels: &[u8], threads: usize) -> Result<Self> {
         let groups = labels.iter().map(|l| *l as u16).collect();
         Ok(Self { engine: Engine::from_gaussians(gaussians, threads)?, groups })
@@ -34,6 +39,10 @@ impl Labeller {
         Ok(self.engine.set_groups(&self.groups, &tree.poses(q))?)
     }
 
+    /// The picture as posed last; `background`: sRGB, 0..1.
+    ///
+    /// # Errors
+    /// Those of the engine.
     pub fn render(&mut self, camera: &Camera, background: [f32; 3]) -> Result<Picture> {
         let render = self.engine.render(camera, &RenderOptions { background, ..Default::default() })?;
         let hits = self.engine.median()?;
