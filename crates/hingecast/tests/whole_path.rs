@@ -127,7 +127,7 @@ fn noise_asks_the_pictures_too() {
         assert_same_bytes(&dir.join("run1").join(stage), &dir.join("run2").join(stage));
     }
     let placed: serde_json::Value = serde_json::from_str(&text(&dir.join("run1/splat/placed.json"))).unwrap();
-    assert_eq!(placed["rig"].as_array().unwrap().len(), 5);
+    assert_eq!(placed["state_from_world"].as_array().unwrap().len(), 5);
     let nats = |k: usize| placed["nats"][k].as_f64().unwrap();
     assert!(nats(1) < nats(0), "{} -> {}", nats(0), nats(1));
     let joints: serde_json::Value = serde_json::from_str(&text(&dir.join("run1/joints/joints.json"))).unwrap();
