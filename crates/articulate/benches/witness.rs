@@ -73,7 +73,7 @@ fn sweep(bencher: Bencher) {
 }
 
 /// Both joints from half a voxel beside the truth; all threads.
-#[divan::bench]
+#[divan::bench(max_time = 5)]
 fn fit_all_joints(bencher: Bencher) {
     let (scene, evidence, members) = seen();
     let moving: Vec<Member> = members.iter().filter(|m| m.part != 0).copied().collect();

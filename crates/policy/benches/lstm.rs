@@ -34,14 +34,14 @@ fn batch(numbers: &(Vec<f32>, Vec<f32>)) -> Batch<'_> {
     Batch { sequences: SEQUENCES, steps: STEPS, observations: &numbers.0, actions: &numbers.1 }
 }
 
-#[divan::bench(args = HIDDEN)]
+#[divan::bench(args = HIDDEN, max_time = 5)]
 fn forward(bencher: Bencher, hidden: usize) {
     let ((net, parameters), numbers) = (network(hidden), numbers());
     let mut workspace = Workspace::default();
     bencher.bench_local(|| net.loss(black_box(&parameters), &batch(&numbers), &mut workspace));
 }
 
-#[divan::bench(args = HIDDEN)]
+#[divan::bench(args = HIDDEN, max_time = 5)]
 fn forward_and_backward(bencher: Bencher, hidden: usize) {
     let ((net, parameters), numbers) = (network(hidden), numbers());
     let mut workspace = Workspace::default();
