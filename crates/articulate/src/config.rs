@@ -12,12 +12,14 @@ pub struct Config {
     pub max_parts: usize,
     /// Correct camera poses by the depth, where it shows that they are off.
     pub align_cameras: bool,
-    /// Decide labels where parts meet pixel by pixel, where depth is sharp. Twins come out better, joints stay the same.
+    /// Decide labels where parts meet pixel by pixel, where depth is sharp. Twins come out better,
+    /// joints stay the same.
     pub borders: bool,
     /// Seed of everything random: the same seed, the same bytes.
     #[serde(skip)]
     pub seed: u64,
-    /// Names of passes (see [`PASSES`](crate::passes::PASSES)) that are left out, to see what each is worth.
+    /// Names of passes (see [`PASSES`](crate::passes::PASSES)) that are left out, to see what each
+    /// is worth.
     #[serde(skip)]
     pub skip: Vec<String>,
 }
@@ -28,5 +30,6 @@ impl Default for Config {
     }
 }
 
-/// With fewer states a flat part is free to slide in its own plane: more is tried, and less is believed.
+/// With fewer states a flat part is free to slide in its own plane: more is tried, and less is
+/// believed.
 pub const MANY_STATES: usize = 4;

@@ -4,18 +4,21 @@ use crate::error::{ArticulateError, DepthError};
 use crate::observe::depth_view::{DepthView, OBJECT};
 use glam::{DVec2, Vec3};
 
-/// Depth pictures of an object in several states: a recording on disk, or `Vec<Vec<DepthView>>` in memory ([state][view]).
+/// Depth pictures of an object in several states: a recording on disk, or `Vec<Vec<DepthView>>` in
+/// memory ([state][view]).
 pub trait Depths {
     /// Number of states.
     fn n_states(&self) -> usize;
 
-    /// Box of the object over all states, world frame, scene units. What lies outside is not looked at.
+    /// Box of the object over all states, world frame, scene units. What lies outside is not looked
+    /// at.
     ///
     /// # Errors
     /// Whatever keeps it from being known.
     fn extent(&mut self) -> Result<(Vec3, Vec3), DepthError>;
 
-    /// The views of one state. Asked for two or three times; dropped before the next state is asked for.
+    /// The views of one state. Asked for two or three times; dropped before the next state is asked
+    /// for.
     ///
     /// # Errors
     /// Whatever keeps them from being read.
@@ -48,8 +51,8 @@ impl Depths for Vec<Vec<DepthView>> {
     }
 }
 
-/// Refuses views that nothing can be read from. Finite depth is for whoever makes the views to see to; a camera is looked at here, since one
-/// that is not finite spoils every state.
+/// Refuses views that nothing can be read from. Finite depth is for whoever makes the views to see
+/// to; a camera is looked at here, since one that is not finite spoils every state.
 ///
 /// # Errors
 /// Sizes that do not fit, cameras or depths that are not finite.

@@ -1,4 +1,5 @@
-//! What a person should know before believing the joints. A doubt is data; its `Display` is the sentence that people read.
+//! What a person should know before believing the joints. A doubt is data; its `Display` is the
+//! sentence that people read.
 
 use hingecast_geom::JointKind;
 use serde::{Deserialize, Serialize};

@@ -21,7 +21,8 @@ use hingecast_geom::{Certainty, KinematicTree, Pose, Progress};
 
 /// Everything that the depth says about parts and joints.
 pub struct Articulation {
-    /// Parts and joints, with a value of every joint in every state. State 0 is the canonical configuration.
+    /// Parts and joints, with a value of every joint in every state. State 0 is the canonical
+    /// configuration.
     pub tree: KinematicTree,
     /// The surface of every state, one sample a voxel and facing, finer where parts meet.
     pub samples: Vec<Labelled>,
@@ -31,8 +32,8 @@ pub struct Articulation {
     pub cameras: Vec<Vec<Pose>>,
     /// What the last fit knew.
     pub report: FitReport,
-    /// What the depth says about the pose of every part (see [`crate::pictures`]); empty where depth is so sharp that pictures
-    /// have nothing to add. [state][part]
+    /// What the depth says about the pose of every part (see [`crate::pictures`]); empty where
+    /// depth is so sharp that pictures have nothing to add. [state][part]
     pub information: Vec<Vec<Information>>,
     /// Of each joint, in the tree's order.
     pub certainty: Vec<Certainty>,
@@ -45,8 +46,8 @@ pub struct Articulation {
 /// Finds parts and joints.
 ///
 /// # Errors
-/// No state or more than [`MOST_STATES`], an extent or a view that is empty or not finite, a pass to skip that does not exist; what
-/// `depths` fails with; the wish to stop.
+/// No state or more than [`MOST_STATES`], an extent or a view that is empty or not finite, a pass
+/// to skip that does not exist; what `depths` fails with; the wish to stop.
 ///
 /// # Examples
 /// ```

@@ -1,4 +1,5 @@
-//! Depth of an articulated object in several states -> its parts, its joints, a kinematic tree, and what is doubtful.
+//! Depth of an articulated object in several states -> its parts, its joints, a kinematic tree, and
+//! what is doubtful.
 //!
 //! [`find`](find()) does it all; the folders are its steps, in this order:
 //!
@@ -15,12 +16,13 @@
 //! classical   the other method (`--method track`), for comparison
 //! ```
 //!
-//! World frame, scene units and radians throughout; `a_from_b` maps points of frame b into frame a; cameras are OpenCV's.
-//! Same input, settings and seed give the same bytes with any number of threads.
+//! World frame, scene units and radians throughout; `a_from_b` maps points of frame b into frame a;
+//! cameras are OpenCV's. Same input, settings and seed give the same bytes with any number of
+//! threads.
 //!
 //! # Examples
-//! See [`find`](find()): depth images of your own, ten lines to their joints. `examples/find_joints.rs` of the crate `hingecast` does the
-//! same from a recording.
+//! See [`find`](find()): depth images of your own, ten lines to their joints.
+//! `examples/find_joints.rs` of the crate `hingecast` does the same from a recording.
 
 #![warn(missing_docs)]
 

@@ -1,5 +1,5 @@
-//! Looks for doubts: rivals that explain the recording nearly as well, what the depth hardly determines, pieces that always moved
-//! together.
+//! Looks for doubts: rivals that explain the recording nearly as well, what the depth hardly
+//! determines, pieces that always moved together.
 
 use crate::doubt::Doubt;
 use crate::fit::rival::rival;
@@ -26,7 +26,8 @@ const UNEXPLAINED_SHARE: f64 = 0.005;
 /// Share of the part's samples that a state must confirm.
 const SEEN_SHARE: f64 = 0.05;
 
-/// Doubts, gravest first, and how sure one may be of each joint. `clouds`: the part of every point of every state's cloud.
+/// Doubts, gravest first, and how sure one may be of each joint. `clouds`: the part of every point
+/// of every state's cloud.
 pub fn weigh_doubts(
     evidence: &Evidence,
     found: &Estimate,

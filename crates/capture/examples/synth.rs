@@ -1,4 +1,5 @@
-//! Records a synthetic object: `cargo run --release -p hingecast-capture --example synth -- OBJECT -o REC`.
+//! Records a synthetic object: `cargo run --release -p hingecast-capture --example synth -- OBJECT
+//! -o REC`.
 
 use hingecast_capture::CaptureError;
 use hingecast_capture::object::ArticulatedObject;

@@ -1,4 +1,5 @@
-//! Recordings of an articulated object in several joint states: read, check, import, and render synthetic ones.
+//! Recordings of an articulated object in several joint states: read, check, import, and render
+//! synthetic ones.
 //!
 //! - [`Recording`] reads the native layout (nerfstudio's `transforms.json` plus a per-frame `state`);
 //!   [`ViewCache`] keeps decoded views within a byte budget.

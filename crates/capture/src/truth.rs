@@ -1,6 +1,8 @@
-//! What `synth` knows about a recording it made. `build` never reads it: only evaluation and tests do.
+//! What `synth` knows about a recording it made. `build` never reads it: only evaluation and tests
+//! do.
 //!
-//! `<REC>.truth/`: `truth.json`, `parts/<part>.ply` (canonical world pose), `labels/<colour name>.png` (part id + 1).
+//! `<REC>.truth/`: `truth.json`, `parts/<part>.ply` (canonical world pose), `labels/<colour
+//! name>.png` (part id + 1).
 
 use crate::{CaptureError, recording::images};
 use hingecast_geom::{Camera, KinematicTree, TriMesh};
@@ -24,7 +26,8 @@ pub struct Truth {
     pub n_states: usize,
     /// Joint limits of the source file, one pair a joint.
     pub source_limits: Vec<[f64; 2]>,
-    /// Exact cameras, one a frame of `transforms.json` in order (the recording's own may carry noise).
+    /// Exact cameras, one a frame of `transforms.json` in order (the recording's own may carry
+    /// noise).
     pub cameras: Vec<Camera>,
 }
 

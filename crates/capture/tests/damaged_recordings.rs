@@ -1,5 +1,5 @@
-//! Every way in which a recording was seen or thought to break: each ends in a named finding of three lines, and in a
-//! repair where that is safe. Never a panic.
+//! Every way in which a recording was seen or thought to break: each ends in a named finding of
+//! three lines, and in a repair where that is safe. Never a panic.
 
 mod common;
 

@@ -1,5 +1,6 @@
-//! Each layout is written by hand around one known 3D point: after the import it must project to its pixel, with its
-//! depth and mask. Conversions here are written out anew, not taken from the crate.
+//! Each layout is written by hand around one known 3D point: after the import it must project to
+//! its pixel, with its depth and mask. Conversions here are written out anew, not taken from the
+//! crate.
 
 use glam::{DMat4, DVec2, DVec3, DVec4};
 use hingecast_capture::import::{Format, detect, import};

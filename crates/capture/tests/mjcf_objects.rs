@@ -1,4 +1,5 @@
-//! MJCF objects: frames, joints, shapes, defaults; and the project's own samples when they are there.
+//! MJCF objects: frames, joints, shapes, defaults; and the project's own samples when they are
+//! there.
 
 use glam::{DQuat, DVec3};
 use hingecast_capture::Truth;

@@ -39,8 +39,8 @@ fn the_hand_holds_on_and_moves_with_the_part() {
     for state in 1..4 {
         let here = hand_in_lid(&recording, &truth, state);
         assert!(first.len() > 200 && here.len() > 200, "state {state}: {} and {} points", first.len(), here.len());
-        // Both are the same arm seen by the same cameras, and the lid has turned by 30 deg and more since: only an arm that turned
-        // with it lies on itself. Pixels are 9 mm apart.
+        // Both are the same arm seen by the same cameras, and the lid has turned by 30 deg and more
+        // since: only an arm that turned with it lies on itself. Pixels are 9 mm apart.
         let nearest = |x: &DVec3| first.iter().map(|y| x.distance(*y)).fold(f64::INFINITY, f64::min);
         let apart = here.iter().map(nearest).sum::<f64>() / here.len() as f64;
         assert!(apart < 0.02, "state {state}: {apart} m apart");
@@ -66,8 +66,8 @@ fn hands_are_masked_in_training_frames_only_and_time_runs() {
             assert!(frame.occluder_mask.is_none() && !view.usable.contains(&0));
             continue;
         }
-        // Whatever is neither object nor masked is background, even beside the hand, where pixels are mixed. Beside the object they
-        // are mixed with the object.
+        // Whatever is neither object nor masked is background, even beside the hand, where pixels
+        // are mixed. Beside the object they are mixed with the object.
         let labels = truth.labels(&frame.color).unwrap();
         let w = frame.camera.width;
         for p in 0..labels.len() {

@@ -29,7 +29,8 @@ where
     PossibleValuesParser::new(all).map(|word| serde_json::from_value(word.into()).expect("a word of the list"))
 }
 
-/// A cast of a thing, with its hinges: RGB-D recordings of an articulated object become a twin that MuJoCo runs.
+/// A cast of a thing, with its hinges: RGB-D recordings of an articulated object become a twin that
+/// MuJoCo runs.
 #[derive(Parser, Debug)]
 #[command(version, max_term_width = 110, after_help = EXAMPLES)]
 pub struct Cli {
@@ -41,7 +42,8 @@ pub struct Cli {
     /// Nothing on stderr but errors, not even the answer: that comes with --json.
     #[arg(long, short, global = true)]
     pub quiet: bool,
-    /// Worker threads, 1 to 256, or to 4 per core if that is more [default: all cores]. The results do not depend on it.
+    /// Worker threads, 1 to 256, or to 4 per core if that is more [default: all cores]. The results
+    /// do not depend on it.
     #[arg(long, global = true, value_name = "N", value_parser = at_least_one)]
     pub threads: Option<usize>,
 }
@@ -50,11 +52,14 @@ pub struct Cli {
 pub enum Verb {
     /// Record a sample object, build its twin, write the report: the whole path in a few minutes.
     Demo(Demo),
-    /// Render a recording of an articulated object (URDF, MJCF, PartNet-Mobility) together with its truth.
+    /// Render a recording of an articulated object (URDF, MJCF, PartNet-Mobility) together with its
+    /// truth.
     Synth(Synth),
-    /// Convert a recording of another layout (nerfstudio, ArtGS, DTA, PARIS, ScrewSplat, Dynamic 3D Gaussians).
+    /// Convert a recording of another layout (nerfstudio, ArtGS, DTA, PARIS, ScrewSplat, Dynamic 3D
+    /// Gaussians).
     Import(Import),
-    /// Convert an object (PartNet-Mobility, URDF) for the simulator: convex collision pieces, joints, limits, masses.
+    /// Convert an object (PartNet-Mobility, URDF) for the simulator: convex collision pieces,
+    /// joints, limits, masses.
     ImportObject(ImportObject),
     /// Say what is wrong with a recording and what to try; `--fix` repairs what is safe to repair.
     Check(Check),
@@ -64,13 +69,17 @@ pub enum Verb {
     Eval(Eval),
     /// Write the report of a run again.
     Report(Report),
-    /// Record demonstrations of the robot arm opening an object or its twin; `--inspect` lists, plots and replays them.
+    /// Record demonstrations of the robot arm opening an object or its twin; `--inspect` lists,
+    /// plots and replays them.
     Demos(Demos),
-    /// Clone a policy from demonstrations (robomimic HDF5). Run again to resume; `--sweep` tries many settings.
+    /// Clone a policy from demonstrations (robomimic HDF5). Run again to resume; `--sweep` tries
+    /// many settings.
     Train(Train),
-    /// Run a policy in seeded episodes on the true object, on its twin and on spoiled ones; compare in pairs.
+    /// Run a policy in seeded episodes on the true object, on its twin and on spoiled ones; compare
+    /// in pairs.
     Rollout(Rollout),
-    /// Ask what a twin is worth: policies trained on the object act on its twins and on spoiled ones, and back; one table, one plot.
+    /// Ask what a twin is worth: policies trained on the object act on its twins and on spoiled
+    /// ones, and back; one table, one plot.
     Experiment(Experiment),
     /// Record, build and evaluate a suite of objects; print the table of errors and times.
     Bench(Bench),
@@ -90,7 +99,8 @@ pub struct Demo {
 
 #[derive(Args, Debug)]
 pub struct Synth {
-    /// Folder or file of the object, or the name of a sample (see objects/) or of one in $HINGECAST_DATA.
+    /// Folder or file of the object, or the name of a sample (see objects/) or of one in
+    /// $HINGECAST_DATA.
     pub object: String,
     /// Recording folder to write; the truth goes to <OUT>.truth.
     #[arg(long, short)]
@@ -119,17 +129,21 @@ pub struct SynthSettings {
     /// Image width and height, pixels.
     #[arg(long, default_value_t = 256, value_name = "PIXELS")]
     pub size: usize,
-    /// Sensor model: `none` is exact; `d435` has depth noise, holes, colour noise, ragged masks and poses off by 0.5 deg and 3 mm.
+    /// Sensor model: `none` is exact; `d435` has depth noise, holes, colour noise, ragged masks and
+    /// poses off by 0.5 deg and 3 mm.
     #[arg(long, default_value = "none", value_parser = ["none", "d435"])]
     pub noise: String,
-    /// A hand and forearm reach in on this share of the training frames [default without a value: 0.2].
+    /// A hand and forearm reach in on this share of the training frames [default without a value:
+    /// 0.2].
     #[arg(long, value_name = "SHARE", num_args = 0..=1, default_missing_value = "0.2")]
     pub occluders: Option<f64>,
-    /// A recording of play: in every training frame hands hold the parts that move, and move along, as cameras see a person who
-    /// plays with the object; their pixels are masked, frames that show little else are marked.
+    /// A recording of play: in every training frame hands hold the parts that move, and move along,
+    /// as cameras see a person who plays with the object; their pixels are masked, frames that show
+    /// little else are marked.
     #[arg(long, conflicts_with = "occluders")]
     pub play: bool,
-    /// First and last value of a joint, radians (hinge) or scene units (slide); may be repeated [default: what it can do].
+    /// First and last value of a joint, radians (hinge) or scene units (slide); may be repeated
+    /// [default: what it can do].
     #[arg(long = "range", value_name = "JOINT=FROM:TO")]
     pub ranges: Vec<String>,
 }
@@ -148,13 +162,14 @@ pub struct Import {
 
 #[derive(Args, Debug)]
 pub struct ImportObject {
-    /// Folder or file of the object (mobility.urdf), or the name of a sample or of one in $HINGECAST_DATA.
+    /// Folder or file of the object (mobility.urdf), or the name of a sample or of one in
+    /// $HINGECAST_DATA.
     pub object: String,
     /// Object folder to write: robot.xml (MJCF), robot.urdf, meshes.
     #[arg(long, short)]
     pub out: PathBuf,
-    /// All lengths times this. The simulator scales by itself what its arm cannot reach; leave it when twins of the same
-    /// recordings shall fit.
+    /// All lengths times this. The simulator scales by itself what its arm cannot reach; leave it
+    /// when twins of the same recordings shall fit.
     #[arg(long, default_value_t = ImportConfig::default().scale, value_name = "FACTOR")]
     pub scale: f64,
     /// Density of all parts, kg/m^3.
@@ -180,8 +195,8 @@ pub struct Build {
     pub out: Option<PathBuf>,
     #[command(flatten)]
     pub settings: BuildSettings,
-    /// First stage to redo even if it is done: parts, splat, joints or twin (method track: splat, motion, parts,
-    /// joints, twin) [default: the first that is missing].
+    /// First stage to redo even if it is done: parts, splat, joints or twin (method track: splat,
+    /// motion, parts, joints, twin) [default: the first that is missing].
     #[arg(long, value_name = "STAGE")]
     pub from: Option<String>,
     /// Last stage to run [default: twin].
@@ -200,14 +215,17 @@ pub struct BuildSettings {
     /// fast: 12 k gaussians, 1500 steps; default: 24 k, 4000; best: 40 k, 10 000 and finer meshes.
     #[arg(long, value_parser = words::<Preset>(&["fast", "default", "best"]), default_value = "default", hide_possible_values = true)]
     pub preset: Preset,
-    /// How parts and joints are found; screw: by the depth of all states at once; track: the classical way, Dynamic 3D
-    /// Gaussians' tracking, distance clustering, ICP, RANSAC axis [default: screw].
+    /// How parts and joints are found; screw: by the depth of all states at once; track: the
+    /// classical way, Dynamic 3D Gaussians' tracking, distance clustering, ICP, RANSAC axis
+    /// [default: screw].
     #[arg(long, value_parser = words::<Method>(&["screw", "track"]), hide_possible_values = true)]
     pub method: Option<Method>,
-    /// TOML file with settings; its keys beat the preset. A run's own config.toml shows all keys with units.
+    /// TOML file with settings; its keys beat the preset. A run's own config.toml shows all keys
+    /// with units.
     #[arg(long, value_name = "FILE")]
     pub config: Option<PathBuf>,
-    /// One setting, for instance `fit.steps=2000` or `twin.density=800` (kg/m^3); beats the file. May be repeated.
+    /// One setting, for instance `fit.steps=2000` or `twin.density=800` (kg/m^3); beats the file.
+    /// May be repeated.
     #[arg(long = "set", value_name = "KEY=VALUE")]
     pub set: Vec<String>,
     /// Seed of everything random in the build [default: 0].
@@ -222,8 +240,9 @@ pub struct Eval {
     /// Truth folder of the run's recording: <RECORDING>.truth, as `hingecast synth` writes it.
     #[arg(long)]
     pub truth: PathBuf,
-    /// Exit with 1 unless the twin keeps this bar. KEY: joint.axis_deg (at most, degrees), joint.pivot (at most, share of the
-    /// diagonal: 0.01 = 1 %), psnr (at least, dB), parts (1 = the count must be right). May be repeated [default: no bar].
+    /// Exit with 1 unless the twin keeps this bar. KEY: joint.axis_deg (at most, degrees),
+    /// joint.pivot (at most, share of the diagonal: 0.01 = 1 %), psnr (at least, dB), parts (1 =
+    /// the count must be right). May be repeated [default: no bar].
     #[arg(long = "fail-under", value_name = "KEY=VALUE")]
     pub bars: Vec<String>,
 }
@@ -238,17 +257,20 @@ pub struct Report {
 pub struct Train {
     /// Demonstrations in robomimic's HDF5 layout.
     pub demos: PathBuf,
-    /// Policy folder to write: weights (safetensors), policy.json, losses, train.toml with all settings.
+    /// Policy folder to write: weights (safetensors), policy.json, losses, train.toml with all
+    /// settings.
     #[arg(long, short)]
     pub out: PathBuf,
-    /// bc-rnn-fast: LSTM of 100, 6000 steps, minutes on two cores; bc-rnn: robomimic's settings for Lift, LSTM of 400,
-    /// 200 000 steps, hours; bc: an MLP that sees one step.
+    /// bc-rnn-fast: LSTM of 100, 6000 steps, minutes on two cores; bc-rnn: robomimic's settings for
+    /// Lift, LSTM of 400, 200 000 steps, hours; bc: an MLP that sees one step.
     #[arg(long, default_value = "bc-rnn-fast", value_parser = ["bc-rnn-fast", "bc-rnn", "bc"], hide_possible_values = true)]
     pub preset: String,
-    /// TOML file with settings; its keys beat the preset. A policy's own train.toml shows all keys with their values.
+    /// TOML file with settings; its keys beat the preset. A policy's own train.toml shows all keys
+    /// with their values.
     #[arg(long, value_name = "FILE")]
     pub config: Option<PathBuf>,
-    /// One setting, for instance `learning_rate=3e-4` or `net.rnn_hidden=200`; beats the file. May be repeated.
+    /// One setting, for instance `learning_rate=3e-4` or `net.rnn_hidden=200`; beats the file. May
+    /// be repeated.
     #[arg(long = "set", value_name = "KEY=VALUE")]
     pub set: Vec<String>,
     /// Training steps, one batch each [default: of the preset].
@@ -257,11 +279,13 @@ pub struct Train {
     /// Seed of initial weights, batches and split [default: 0].
     #[arg(long, value_name = "N")]
     pub seed: Option<u64>,
-    /// Train once per combination of the settings in this TOML file, each in a folder of its own below OUT; as many at a time as
-    /// there are threads; table and plot at the end. docs/policy.md shows such a file.
+    /// Train once per combination of the settings in this TOML file, each in a folder of its own
+    /// below OUT; as many at a time as there are threads; table and plot at the end. docs/policy.md
+    /// shows such a file.
     #[arg(long, value_name = "FILE")]
     pub sweep: Option<PathBuf>,
-    /// Episodes that every policy of a sweep is rolled out in, where the demonstrations' world is at hand; 0 = none.
+    /// Episodes that every policy of a sweep is rolled out in, where the demonstrations' world is
+    /// at hand; 0 = none.
     #[arg(long, default_value_t = 50, value_name = "N")]
     pub rollouts: usize,
 }
@@ -278,7 +302,8 @@ pub struct Bench {
     pub synth: SynthSettings,
     #[command(flatten)]
     pub build: BuildSettings,
-    /// Compare with the table of an earlier bench (its bench.json); exit 1 when a figure got clearly worse.
+    /// Compare with the table of an earlier bench (its bench.json); exit 1 when a figure got
+    /// clearly worse.
     #[arg(long, value_name = "FILE")]
     pub against: Option<PathBuf>,
     /// Seed of cameras, play and noise of the recordings.
@@ -288,8 +313,8 @@ pub struct Bench {
     /// method is screw. Smaller pictures make it quicker.
     #[arg(long)]
     pub joints: bool,
-    /// For the bench of joints: 25x60, 25x60-d435, 5x48, 5x48-d435, 2x100 or 2x100-d435 (states x views); may be repeated
-    /// [default: all].
+    /// For the bench of joints: 25x60, 25x60-d435, 5x48, 5x48-d435, 2x100 or 2x100-d435 (states x
+    /// views); may be repeated [default: all].
     #[arg(long = "protocol", value_name = "NAME")]
     pub protocols: Vec<String>,
     /// For the bench of joints: recordings of each object, with consecutive seeds.
@@ -302,10 +327,12 @@ pub struct Bench {
 
 #[derive(Args, Debug)]
 pub struct Demos {
-    /// open: through half of the joint's range; close; hinged-box: the seed's two blocks, which lifting solves too.
+    /// open: through half of the joint's range; close; hinged-box: the seed's two blocks, which
+    /// lifting solves too.
     #[arg(long, default_value = "open", value_parser = ["open", "close", "hinged-box"])]
     pub task: String,
-    /// Folder or file of the object, or the name of a sample [default: covered_box; hinged_blocks for hinged-box].
+    /// Folder or file of the object, or the name of a sample [default: covered_box; hinged_blocks
+    /// for hinged-box].
     #[arg(long, value_name = "OBJECT")]
     pub object: Option<String>,
     /// Record on the twin of this run instead [default: on the object].
@@ -314,11 +341,12 @@ pub struct Demos {
     /// Which joint moves, by its name in the model [default: the one that is easiest to grasp].
     #[arg(long, value_name = "NAME")]
     pub joint: Option<String>,
-    /// Simulated metres per unit of the model file [default: at most 1, so that the arm reaches all of the joint's way].
+    /// Simulated metres per unit of the model file [default: at most 1, so that the arm reaches all
+    /// of the joint's way].
     #[arg(long, value_name = "FACTOR")]
     pub scale: Option<f64>,
-    /// Who demonstrates; teleop: you, at the keyboard of this terminal, 20 Hz. Each episode is in the file once it is kept; the
-    /// same command goes on with the file.
+    /// Who demonstrates; teleop: you, at the keyboard of this terminal, 20 Hz. Each episode is in
+    /// the file once it is kept; the same command goes on with the file.
     #[arg(long, default_value = "scripted", value_parser = ["scripted", "teleop"])]
     pub expert: String,
     /// Successful episodes to record (teleop: episodes to keep, unless you quit before).
@@ -330,7 +358,8 @@ pub struct Demos {
     /// Seed of places, starts and imperfections.
     #[arg(long, default_value_t = 0, value_name = "N")]
     pub seed: u64,
-    /// List and plot this file and replay it; exit 1 unless every state comes out with the same bits [default: none].
+    /// List and plot this file and replay it; exit 1 unless every state comes out with the same
+    /// bits [default: none].
     #[arg(long, value_name = "FILE")]
     pub inspect: Option<PathBuf>,
 }
@@ -339,18 +368,21 @@ pub struct Demos {
 pub struct Rollout {
     /// Folder of the policy, the -o of `hingecast train`.
     pub policy: PathBuf,
-    /// The true object: folder, file or name of a sample [default: what the demonstrations were recorded on].
+    /// The true object: folder, file or name of a sample [default: what the demonstrations were
+    /// recorded on].
     #[arg(long, value_name = "OBJECT")]
     pub object: Option<String>,
-    /// Run whose twin takes the object's place; both given: same seeds, compared in pairs [default: none].
+    /// Run whose twin takes the object's place; both given: same seeds, compared in pairs [default:
+    /// none].
     #[arg(long, value_name = "RUN")]
     pub twin: Option<PathBuf>,
-    /// Also on the object spoiled on purpose: axis=DEGREES, pivot=MM, limits=SHARE, edge (the hinge on the opposite edge);
-    /// joined by commas for several at once; may be repeated, each is a world of its own [default: none].
+    /// Also on the object spoiled on purpose: axis=DEGREES, pivot=MM, limits=SHARE, edge (the hinge
+    /// on the opposite edge); joined by commas for several at once; may be repeated, each is a
+    /// world of its own [default: none].
     #[arg(long, value_name = "HOW")]
     pub spoil: Vec<String>,
-    /// Demonstrations whose task (place, grasp, size) holds here [default: those that the policy was trained on; without
-    /// a note of them the task is made from the object].
+    /// Demonstrations whose task (place, grasp, size) holds here [default: those that the policy
+    /// was trained on; without a note of them the task is made from the object].
     #[arg(long, value_name = "FILE")]
     pub demos: Option<PathBuf>,
     /// Episodes in every world.
@@ -359,7 +391,8 @@ pub struct Rollout {
     /// Seed of the episodes; that of the demonstrations (0) would begin where they began.
     #[arg(long, default_value_t = 1, value_name = "N")]
     pub seed: u64,
-    /// Folder for the report: index.html, rollout.json, a strip of pictures of each kind of end [default: none, only the answer].
+    /// Folder for the report: index.html, rollout.json, a strip of pictures of each kind of end
+    /// [default: none, only the answer].
     #[arg(long, short, value_name = "FOLDER")]
     pub out: Option<PathBuf>,
 }
@@ -369,20 +402,22 @@ pub struct Experiment {
     /// Object names, `ours` (objects/), `real` ($HINGECAST_DATA) or `all`.
     #[arg(default_values_t = ["covered_box", "microwave", "cabinet_two_door", "three_drawers"].map(String::from))]
     pub objects: Vec<String>,
-    /// Folder to write: experiment.md, .csv, .json and .svg, and a folder of each object with all that was made on the way. Run
-    /// again to go on.
+    /// Folder to write: experiment.md, .csv, .json and .svg, and a folder of each object with all
+    /// that was made on the way. Run again to go on.
     #[arg(long, short)]
     pub out: PathBuf,
-    /// Recordings to take instead of rendering: <FOLDER>/<object>; what is not there is rendered [default: none].
+    /// Recordings to take instead of rendering: <FOLDER>/<object>; what is not there is rendered
+    /// [default: none].
     #[arg(long, value_name = "FOLDER")]
     pub recordings: Option<PathBuf>,
-    /// Runs of `hingecast build` to take instead of building: <FOLDER>/<object>, for the twin whose method they have; may be
-    /// repeated; what is not there is built [default: none].
+    /// Runs of `hingecast build` to take instead of building: <FOLDER>/<object>, for the twin whose
+    /// method they have; may be repeated; what is not there is built [default: none].
     #[arg(long, value_name = "FOLDER")]
     pub runs: Vec<PathBuf>,
-    /// A world besides the true object: twin, track (the classical method's twin), axis=DEGREES, pivot=MM (simulated), limits=SHARE,
-    /// edge, or back (a policy from the twin on the true object); may be repeated [default: twin, track, axis=3, axis=10, axis=30,
-    /// pivot=3, pivot=10, pivot=30, limits=0.5, edge, back].
+    /// A world besides the true object: twin, track (the classical method's twin), axis=DEGREES,
+    /// pivot=MM (simulated), limits=SHARE, edge, or back (a policy from the twin on the true
+    /// object); may be repeated [default: twin, track, axis=3, axis=10, axis=30, pivot=3, pivot=10,
+    /// pivot=30, limits=0.5, edge, back].
     #[arg(long = "world", value_name = "NAME")]
     pub worlds: Vec<String>,
     /// Demonstrations on each object, and on each twin for `back`.
@@ -400,7 +435,8 @@ pub struct Experiment {
     /// Preset of the policies, as in `train`.
     #[arg(long, default_value = "bc-rnn-fast", value_parser = ["bc-rnn-fast", "bc-rnn", "bc"])]
     pub policy: String,
-    /// One setting of the training, for instance `steps=3000`; may be repeated [default: those of the preset].
+    /// One setting of the training, for instance `steps=3000`; may be repeated [default: those of
+    /// the preset].
     #[arg(long = "policy-set", value_name = "KEY=VALUE")]
     pub policy_set: Vec<String>,
     #[command(flatten)]

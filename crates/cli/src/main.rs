@@ -1,4 +1,5 @@
-//! The `hingecast` binary: flags and glue. Exit 0 done, 1 under the asked bar, 2 error, 130 stopped by Ctrl-C.
+//! The `hingecast` binary: flags and glue. Exit 0 done, 1 under the asked bar, 2 error, 130 stopped
+//! by Ctrl-C.
 
 // `ui` writes to the terminal, and nobody else.
 #![deny(clippy::print_stdout, clippy::print_stderr)]

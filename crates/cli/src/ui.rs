@@ -1,6 +1,7 @@
-//! What a person sees while a stage runs: a bar with ETA on a terminal, a line now and then elsewhere.
-//! Everything human goes to stderr; stdout is for `--json`. Nobody else writes there: `println!` and `eprintln!` panic when the reader
-//! has gone, which is nothing to lose a build of an hour for.
+//! What a person sees while a stage runs: a bar with ETA on a terminal, a line now and then
+//! elsewhere. Everything human goes to stderr; stdout is for `--json`. Nobody else writes there:
+//! `println!` and `eprintln!` panic when the reader has gone, which is nothing to lose a build of
+//! an hour for.
 
 use hingecast::failure::{Failure, Result};
 use hingecast::watcher::Watcher;
@@ -41,7 +42,8 @@ pub struct Ui {
 }
 
 impl Ui {
-    /// Installs the Ctrl-C handler: the first one asks every stage to stop at its next checkpoint, the second kills.
+    /// Installs the Ctrl-C handler: the first one asks every stage to stop at its next checkpoint,
+    /// the second kills.
     pub fn new(quiet: bool) -> Self {
         let cancel = Arc::new(AtomicBool::new(false));
         let flag = cancel.clone();

@@ -1,4 +1,5 @@
-//! What goes wrong on the command line ends in three lines: what, where, what to try. Never in a panic.
+//! What goes wrong on the command line ends in three lines: what, where, what to try. Never in a
+//! panic.
 
 mod common;
 
@@ -140,7 +141,8 @@ fn stages() {
     hingecast(d.path(), "build rec -o run --from twin --to splat").refused("nothing is left to do", "--from");
 }
 
-/// A build empties the folders of its stages, and `--fresh` the whole run: never somebody's own folder.
+/// A build empties the folders of its stages, and `--fresh` the whole run: never somebody's own
+/// folder.
 #[test]
 fn a_run_folder_that_holds_something_else() {
     let d = dir();

@@ -1,4 +1,5 @@
-//! `hingecast experiment` through the real binary, as small as it can be: it shows the chain, not the quality.
+//! `hingecast experiment` through the real binary, as small as it can be: it shows the chain, not
+//! the quality.
 #![cfg(feature = "mujoco")]
 
 mod common;

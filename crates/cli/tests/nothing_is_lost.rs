@@ -1,4 +1,5 @@
-//! Whatever a command writes, nobody's files are lost; and a run is never taken for more than it is.
+//! Whatever a command writes, nobody's files are lost; and a run is never taken for more than it
+//! is.
 
 mod common;
 
@@ -163,7 +164,8 @@ fn numbers_that_point_nowhere(dir: &Path, run: &Path) {
     hingecast(dir, "report run -q").done();
 }
 
-/// `hingecast ... | true` once died of "failed printing to stdout", and a build of its `2>&1 | head`.
+/// `hingecast ... | true` once died of "failed printing to stdout", and a build of its `2>&1 |
+/// head`.
 #[test]
 fn nobody_reads_any_more() {
     let dir = tempfile::tempdir().unwrap();
@@ -212,7 +214,8 @@ fn threads_are_bounded() {
     hingecast(dir.path(), "doctor --threads 1000000").refused("more threads than", "--threads 1000000");
 }
 
-/// `bench --tidy` once deleted whatever lay where it wanted to record, also when it was refused for that.
+/// `bench --tidy` once deleted whatever lay where it wanted to record, also when it was refused for
+/// that.
 #[test]
 fn tidying_leaves_what_it_did_not_record() {
     let dir = tempfile::tempdir().unwrap();

@@ -1,11 +1,12 @@
-//! A real object (PartNet-Mobility) through the whole path, where `HINGECAST_DATA` says that it is at hand.
+//! A real object (PartNet-Mobility) through the whole path, where `HINGECAST_DATA` says that it is
+//! at hand.
 
 mod common;
 
 use common::{assert_finite, hingecast};
 
-/// The trash can with a fraction of the default pictures, pixels and steps: both methods find the lid's hinge all the same,
-/// and the default one to a tenth of a degree.
+/// The trash can with a fraction of the default pictures, pixels and steps: both methods find the
+/// lid's hinge all the same, and the default one to a tenth of a degree.
 #[test]
 fn the_trash_can_has_its_hinge() {
     if std::env::var_os("HINGECAST_DATA").is_none() {

@@ -1,4 +1,5 @@
-//! Killed or stopped, the same command goes on and ends with the same bytes as if nothing had happened.
+//! Killed or stopped, the same command goes on and ends with the same bytes as if nothing had
+//! happened.
 
 mod common;
 
@@ -7,7 +8,8 @@ use std::path::Path;
 use std::process::{Child, Command};
 use std::time::{Duration, Instant};
 
-/// Waits until `file` is there, or the build ended before (on a fast machine: then there is nothing to interrupt).
+/// Waits until `file` is there, or the build ended before (on a fast machine: then there is nothing
+/// to interrupt).
 fn await_file(child: &mut Child, file: &Path) -> bool {
     let start = Instant::now();
     while !file.exists() {
@@ -60,7 +62,8 @@ fn a_killed_or_stopped_build_goes_on() {
     }
 }
 
-/// `kill -9` in the middle of the fit: a checkpoint or a fresh start, but never half a stage taken for a whole one.
+/// `kill -9` in the middle of the fit: a checkpoint or a fresh start, but never half a stage taken
+/// for a whole one.
 #[test]
 fn a_build_killed_during_the_fit_goes_on() {
     let dir = tempfile::tempdir().unwrap();

@@ -201,7 +201,8 @@ fn damaged_policies_and_twins_are_named() {
     damaged("env_args.json", &other_task, "missing field `grasp`", "env_args.json");
     kept.iter().for_each(|(path, bytes)| std::fs::write(path, bytes).unwrap());
 
-    // Twins: without the joint, with a joint elsewhere, with one that is no number, without the file.
+    // Twins: without the joint, with a joint elsewhere, with one that is no number, without the
+    // file.
     let xml = std::fs::read_to_string(common::objects().join("covered_box/object.xml")).unwrap();
     let joint = &xml[xml.find("<joint").unwrap()..];
     let joint = &joint[..=joint.find('>').unwrap()];

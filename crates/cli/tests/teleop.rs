@@ -1,4 +1,5 @@
-//! Tele-operation in the real simulator, driven by key events: recorded, undone, discarded, kept, written, read, replayed to the bit.
+//! Tele-operation in the real simulator, driven by key events: recorded, undone, discarded, kept,
+//! written, read, replayed to the bit.
 #![cfg(feature = "mujoco")]
 
 mod common;
@@ -70,7 +71,8 @@ impl Typist {
         self.now += Duration::from_millis(50);
     }
 
-    /// Goes above the grasp, down, closes, and follows the lid; `each` is asked before every step whether to go on.
+    /// Goes above the grasp, down, closes, and follows the lid; `each` is asked before every step
+    /// whether to go on.
     fn open(&mut self, mut each: impl FnMut(&mut Self) -> bool) {
         let mut closing = 0;
         for _ in 0..600 {
@@ -162,7 +164,8 @@ fn a_session_by_keys_is_recorded_undone_and_replays_to_the_bit() {
     let status = typist.session.status();
     assert!(status.kept == 1 && !status.recording && status.notice.contains("success"), "{status:?}");
 
-    // Undo while the lid is in the hand, slowly pulled: the closed fingers come back with the world.
+    // Undo while the lid is in the hand, slowly pulled: the closed fingers come back with the
+    // world.
     typist.tap(Key::Slower);
     typist.tap(Key::Slower);
     typist.command(Command::Record);

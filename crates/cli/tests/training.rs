@@ -1,4 +1,5 @@
-//! `hingecast train` from the command line: a policy, resumed after a kill, swept; and what it refuses.
+//! `hingecast train` from the command line: a policy, resumed after a kill, swept; and what it
+//! refuses.
 
 mod common;
 

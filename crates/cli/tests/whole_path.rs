@@ -21,8 +21,9 @@ fn text(path: &Path) -> String {
     std::fs::read_to_string(path).unwrap_or_else(|e| panic!("{}: {e}", path.display()))
 }
 
-/// Joints and pictures as good as they usually are on the tiny recording. Three seeds gave axes of 0.0013 to 0.0024 deg, pivots of 9e-6 to
-/// 1.1e-5, angles of 0.0013 to 0.0015 deg in the mean over states, 27.5 to 27.7 dB and labels of 0.923 to 0.930.
+/// Joints and pictures as good as they usually are on the tiny recording. Three seeds gave axes of
+/// 0.0013 to 0.0024 deg, pivots of 9e-6 to 1.1e-5, angles of 0.0013 to 0.0015 deg in the mean over
+/// states, 27.5 to 27.7 dB and labels of 0.923 to 0.930.
 fn assert_usual(figures: &serde_json::Value) {
     let number = |value: &serde_json::Value| value.as_f64().unwrap_or(f64::NAN);
     assert_eq!((&figures["found_parts"], &figures["true_parts"]), (&2.into(), &2.into()), "{figures}");
@@ -119,7 +120,8 @@ fn synth_check_build_eval_report() {
     assert_eq!(again.stderr.matches("kept").count(), 4, "{again}");
 }
 
-/// Style point 9: the bytes do not depend on the number of threads. All files of the run but those that tell of time.
+/// Style point 9: the bytes do not depend on the number of threads. All files of the run but those
+/// that tell of time.
 #[test]
 fn one_thread_or_two_give_the_same_bytes() {
     let dir = tempfile::tempdir().unwrap();
@@ -138,7 +140,8 @@ fn one_thread_or_two_give_the_same_bytes() {
     }
 }
 
-/// Noisy recordings: the pictures are asked about joints and frames, and that depends on the number of threads no more.
+/// Noisy recordings: the pictures are asked about joints and frames, and that depends on the number
+/// of threads no more.
 #[test]
 fn noise_asks_the_pictures_too() {
     let dir = tempfile::tempdir().unwrap();

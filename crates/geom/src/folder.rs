@@ -1,10 +1,12 @@
-//! Folders that programs fill: nothing of a person's may be in there, since finished work replaces what is there.
+//! Folders that programs fill: nothing of a person's may be in there, since finished work replaces
+//! what is there.
 
 use crate::InputError;
 use crate::staging::is_temporary;
 use std::path::{Path, PathBuf};
 
-/// Whether the `what` ("run folder") may be written at `folder`: it is new, empty, or holds a file of one of the names `ours`.
+/// Whether the `what` ("run folder") may be written at `folder`: it is new, empty, or holds a file
+/// of one of the names `ours`.
 ///
 /// # Errors
 /// It holds something else (`hint` says what to try), or is no folder that can be written.
@@ -20,7 +22,8 @@ pub fn may_become(what: &str, folder: &Path, ours: &[&str], hint: &str) -> Resul
     Err(InputError::new(format!("the {what} holds something else"), folder.display().to_string(), hint))
 }
 
-/// Whether all that is in `folder` may be deleted: every file is, by its path from there, one that this program writes.
+/// Whether all that is in `folder` may be deleted: every file is, by its path from there, one that
+/// this program writes.
 ///
 /// # Errors
 /// There is another one, or the folder cannot be read.
@@ -34,8 +37,9 @@ pub fn may_be_emptied(what: &str, folder: &Path, ours: &dyn Fn(&Path) -> bool, h
     }
 }
 
-/// The first file below `folder`, by its path from there, that is not `ours`. Links are files: nothing behind them is anybody's to delete.
-/// Folders without files hold nothing, and half-written files of killed processes are nobody's.
+/// The first file below `folder`, by its path from there, that is not `ours`. Links are files:
+/// nothing behind them is anybody's to delete. Folders without files hold nothing, and half-written
+/// files of killed processes are nobody's.
 ///
 /// # Errors
 /// When a folder cannot be read.

@@ -54,7 +54,8 @@ impl Gaussians {
         }
     }
 
-    /// Moves gaussian `i` rigidly (view-dependent colour is left in the old frame: degree 1 is a small term).
+    /// Moves gaussian `i` rigidly (view-dependent colour is left in the old frame: degree 1 is a
+    /// small term).
     pub fn transform_one(&mut self, i: usize, pose: &Pose) {
         let x = Vec3::from(self.means[i]).as_dvec3();
         self.means[i] = pose.apply(x).as_vec3().into();

@@ -1,5 +1,6 @@
-//! Iterative closest point of a part's points against the measured surface of a state: point to plane
-//! (Chen and Medioni 1991) with a shrinking gate, so that what is hidden in that state pulls nowhere.
+//! Iterative closest point of a part's points against the measured surface of a state: point to
+//! plane (Chen and Medioni 1991) with a shrinking gate, so that what is hidden in that state pulls
+//! nowhere.
 
 use crate::pose::quat_from_rotation_vector;
 use crate::{PointTree, Pose};
@@ -43,8 +44,8 @@ pub struct IcpReport {
     pub rms: f64,
 }
 
-/// Improves `start` (world at the target state from world at the source state) for `points` with `normals`.
-/// `gates`: largest accepted distance per round, scene units.
+/// Improves `start` (world at the target state from world at the source state) for `points` with
+/// `normals`. `gates`: largest accepted distance per round, scene units.
 ///
 /// # Panics
 /// When `normals` is shorter than `points`, or the target has fewer normals than points.
@@ -52,8 +53,9 @@ pub fn align(points: &[Vec3], normals: &[Vec3], target: &Surface, start: Pose, g
     align_tethered(points, normals, target, start, gates, 0.0)
 }
 
-/// As [`align`], with every point tied to where it was given by `tether` times the pull towards a plane: directions that
-/// the surface leaves open (a plane sliding in itself) stay as they were recorded.
+/// As [`align`], with every point tied to where it was given by `tether` times the pull towards a
+/// plane: directions that the surface leaves open (a plane sliding in itself) stay as they were
+/// recorded.
 ///
 /// # Panics
 /// As [`align`].
@@ -69,7 +71,8 @@ pub fn align_tethered(
     let mut report = IcpReport { inliers: 0.0, rms: f64::INFINITY };
     for &gate in gates {
         let (rot, trans) = (pose.mat3().as_mat3(), pose.trans.as_vec3());
-        // One row per accepted point: J = [x x n | n], residual n . (x - y). Chunked sums keep the order fixed.
+        // One row per accepted point: J = [x x n | n], residual n . (x - y). Chunked sums keep the
+        // order fixed.
         let sums: Vec<(Matrix6<f64>, Vector6<f64>, f64, usize)> = (0..points.len())
             .collect::<Vec<_>>()
             .par_chunks(2048)
@@ -117,7 +120,8 @@ pub fn align_tethered(
             break;
         }
         report = IcpReport { inliers: n as f64 / points.len() as f64, rms: (sum / n as f64).sqrt() };
-        // A little damping keeps directions that the surface does not constrain (a plane sliding in itself) still.
+        // A little damping keeps directions that the surface does not constrain (a plane sliding in
+        // itself) still.
         let damping = 1e-4 * a.trace() / 6.0;
         let Some(step) = (a + Matrix6::identity() * damping).cholesky().map(|c| c.solve(&b)) else { break };
         let delta = Pose::new(

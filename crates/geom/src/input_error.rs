@@ -1,4 +1,5 @@
-//! What is wrong with something a person gave: three lines to act on. The crates that read files share it.
+//! What is wrong with something a person gave: three lines to act on. The crates that read files
+//! share it.
 
 use crate::Cancelled;
 use std::path::Path;
@@ -18,7 +19,8 @@ pub struct InputError {
 }
 
 impl InputError {
-    /// Line breaks inside an argument (parser messages have them) become spaces, so that three lines stay three.
+    /// Line breaks inside an argument (parser messages have them) become spaces, so that three
+    /// lines stay three.
     pub fn new(what: impl Into<String>, place: impl Into<String>, hint: impl Into<String>) -> Self {
         let line = |s: String| s.split_whitespace().collect::<Vec<_>>().join(" ");
         Self { what: line(what.into()), place: line(place.into()), hint: line(hint.into()), cancelled: false }

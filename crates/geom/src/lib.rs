@@ -1,4 +1,5 @@
-//! The plain types every other crate shares: poses, cameras, screws, kinematic trees, gaussians, meshes.
+//! The plain types every other crate shares: poses, cameras, screws, kinematic trees, gaussians,
+//! meshes.
 //!
 //! Conventions, everywhere in hingecast:
 //! - a transform is named `a_from_b` and maps points of frame `b` into frame `a`;

@@ -155,8 +155,9 @@ impl TriMesh {
         balance.values().filter(|&&b| b != 0).count()
     }
 
-    /// For every vertex the smallest vertex of its connected piece. `alike(i)` names the vertex that `i` counts as: itself,
-    /// or the first one at the same place where a file gives every face corners of its own.
+    /// For every vertex the smallest vertex of its connected piece. `alike(i)` names the vertex
+    /// that `i` counts as: itself, or the first one at the same place where a file gives every face
+    /// corners of its own.
     pub fn pieces(&self, alike: impl Fn(u32) -> u32) -> Vec<u32> {
         let mut root: Vec<u32> = (0..self.vertices.len() as u32).map(&alike).collect();
         fn find(root: &mut [u32], mut i: u32) -> u32 {

@@ -1,4 +1,5 @@
-//! Meshes in and out: PLY (vertex colours), OBJ (vertex colours after the position, as MeshLab writes them), binary STL.
+//! Meshes in and out: PLY (vertex colours), OBJ (vertex colours after the position, as MeshLab
+//! writes them), binary STL.
 
 use crate::TriMesh;
 use crate::ply::{self, PlyError};

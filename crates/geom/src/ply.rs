@@ -34,7 +34,8 @@ fn bad(path: &Path, what: impl Into<String>) -> PlyError {
     PlyError::Format { path: path.to_path_buf(), what: what.into() }
 }
 
-/// The scalar vertex properties as f32, row-major (rows, names.len()), and triangle indices if there are faces.
+/// The scalar vertex properties as f32, row-major (rows, names.len()), and triangle indices if
+/// there are faces.
 #[derive(Debug, Default)]
 pub struct VertexTable {
     /// Names of the properties, in file order: the columns of `data`.

@@ -37,7 +37,8 @@ impl Pose {
         Self { rot: DQuat::from_mat3(&rot).normalize(), trans }
     }
 
-    /// The rigid part of a 4x4 matrix; the caller has checked that it is rigid (see [`rigidity_error`]).
+    /// The rigid part of a 4x4 matrix; the caller has checked that it is rigid (see
+    /// [`rigidity_error`]).
     pub fn from_mat4(m: &DMat4) -> Self {
         Self::from_mat3_trans(DMat3::from_mat4(*m), m.w_axis.truncate())
     }

@@ -1,6 +1,7 @@
 //! How a long computation tells how far it is and learns that it should stop.
 //!
-//! Libraries only call [`Progress::report`]; the binary decides what a person sees (bar, line or JSON).
+//! Libraries only call [`Progress::report`]; the binary decides what a person sees (bar, line or
+//! JSON).
 
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -20,12 +21,14 @@ pub struct Progress {
 }
 
 impl Progress {
-    /// `sink(done, total, note)` is called from any thread; `cancel` turns true when work should stop.
+    /// `sink(done, total, note)` is called from any thread; `cancel` turns true when work should
+    /// stop.
     pub fn new(sink: impl Fn(usize, usize, &str) + Send + Sync + 'static, cancel: Arc<AtomicBool>) -> Self {
         Self { sink: Some(Arc::new(sink)), cancel: Some(cancel) }
     }
 
-    /// Says that `done` of `total` steps are finished; `note` is a short figure such as "psnr 31.2".
+    /// Says that `done` of `total` steps are finished; `note` is a short figure such as "psnr
+    /// 31.2".
     ///
     /// # Errors
     /// [`Cancelled`] when the person asked to stop: pass it up with `?`.

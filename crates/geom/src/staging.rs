@@ -1,12 +1,14 @@
-//! Files and folders that appear whole or not at all, also when the process is killed or the machine loses its power.
+//! Files and folders that appear whole or not at all, also when the process is killed or the
+//! machine loses its power.
 //!
 //! ```text
 //! PARENT/.NAME.hingecast-<process>-<random>/hingecast-staging   locked while the process lives
 //!                                          /new                 what is being written
 //!                                          /old                 what stood at NAME, between the two renames
 //! ```
-//! The name cannot be a person's and is made with `create_dir`, so nothing of anybody's is ever taken over. What a killed process left is
-//! removed by the next one that writes the same NAME: only if it has such a name, holds the mark, and its process is gone.
+//! The name cannot be a person's and is made with `create_dir`, so nothing of anybody's is ever
+//! taken over. What a killed process left is removed by the next one that writes the same NAME:
+//! only if it has such a name, holds the mark, and its process is gone.
 
 use rayon::prelude::*;
 use std::ffi::{OsStr, OsString};
@@ -30,7 +32,8 @@ pub struct Staging {
 }
 
 impl Staging {
-    /// Nothing happens at `target` before [`Self::finish`]. A link stays a link: the folder that it names is replaced.
+    /// Nothing happens at `target` before [`Self::finish`]. A link stays a link: the folder that it
+    /// names is replaced.
     ///
     /// # Errors
     /// When the folder around `target` cannot be made or written.
@@ -85,7 +88,8 @@ impl Drop for Staging {
     }
 }
 
-/// Lets `write` make the file `path` out of sight, and renames it into place: a reader never sees half a file.
+/// Lets `write` make the file `path` out of sight, and renames it into place: a reader never sees
+/// half a file.
 ///
 /// # Errors
 /// `write`'s own; else when the disk refuses. What stood at `path` is then untouched.
@@ -101,8 +105,9 @@ pub fn write_through<E: From<std::io::Error>>(
     Ok(sync_folder(parent(&staging.target))?)
 }
 
-/// Writes `bytes` under a name that nobody has and renames: a reader never sees half a file, and after the return
-/// a power cut takes nothing back. A link stays a link: the file that it names is written.
+/// Writes `bytes` under a name that nobody has and renames: a reader never sees half a file, and
+/// after the return a power cut takes nothing back. A link stays a link: the file that it names is
+/// written.
 ///
 /// # Errors
 /// When the disk refuses; what stood at `path` is then untouched.
@@ -113,8 +118,8 @@ pub fn write_whole(path: &Path, bytes: &[u8]) -> Result<()> {
     sync_folder(parent(&target))
 }
 
-/// As [`write_whole`], but not forced to the disk: for the thousands of files of a [`Staging`], which does that once for all, and for
-/// pictures that can be drawn again.
+/// As [`write_whole`], but not forced to the disk: for the thousands of files of a [`Staging`],
+/// which does that once for all, and for pictures that can be drawn again.
 ///
 /// # Errors
 /// When the disk refuses.
@@ -144,8 +149,8 @@ pub fn probe(file: &Path) -> Result<()> {
     fs::remove_file(at)
 }
 
-/// Removes what killed processes left beside `target`, under `target`'s name; puts an old folder back that was renamed away and not
-/// replaced. What cannot be removed stays: it harms nobody.
+/// Removes what killed processes left beside `target`, under `target`'s name; puts an old folder
+/// back that was renamed away and not replaced. What cannot be removed stays: it harms nobody.
 fn sweep(target: &Path) {
     let entries = fs::read_dir(parent(target)).into_iter().flatten().flatten();
     let stem = stem(target);
@@ -154,7 +159,8 @@ fn sweep(target: &Path) {
     }
 }
 
-/// Removes a folder in one step, as seen from outside: killed on the way, nothing of it is left under its name.
+/// Removes a folder in one step, as seen from outside: killed on the way, nothing of it is left
+/// under its name.
 ///
 /// # Errors
 /// When the disk refuses.
@@ -201,7 +207,8 @@ fn clear(path: &Path, target: Option<&Path>) {
     }
     let old = path.join("old");
     if fs::symlink_metadata(&old).is_ok() {
-        // Two renames, killed between them. Where something new stands at the target, the old is superseded.
+        // Two renames, killed between them. Where something new stands at the target, the old is
+        // superseded.
         match target {
             Some(target) if fs::symlink_metadata(target).is_err() => {
                 if fs::rename(&old, target).is_err() {

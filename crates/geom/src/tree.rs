@@ -1,4 +1,5 @@
-//! Screws and kinematic trees: which part moves relative to which, how, and where it was in each state.
+//! Screws and kinematic trees: which part moves relative to which, how, and where it was in each
+//! state.
 
 use crate::Pose;
 use glam::{DQuat, DVec3};
@@ -39,7 +40,8 @@ pub struct Screw {
 }
 
 impl Screw {
-    /// The motion by `q` (radians or metres): revolute x' = R(axis, q)(x - pivot) + pivot, prismatic x' = x + q axis.
+    /// The motion by `q` (radians or metres): revolute x' = R(axis, q)(x - pivot) + pivot,
+    /// prismatic x' = x + q axis.
     pub fn motion(&self, q: f64) -> Pose {
         match self.kind {
             JointKind::Fixed => Pose::IDENTITY,
@@ -114,13 +116,15 @@ impl KinematicTree {
         self.joints.iter().find(|j| j.child == part)
     }
 
-    /// The joints (as indices) between `part` and its root, its own first. A cyclic (invalid) tree ends too.
+    /// The joints (as indices) between `part` and its root, its own first. A cyclic (invalid) tree
+    /// ends too.
     pub fn ancestry(&self, part: usize) -> Vec<usize> {
         let up = |part: usize| self.joints.iter().position(|j| j.child == part);
         std::iter::successors(up(part), |&j| up(self.joints[j].parent)).take(self.parts.len()).collect()
     }
 
-    /// `world_from_canonical` of every part when joint `j` stands at `q[j]`: pose = parent's pose * screw motion.
+    /// `world_from_canonical` of every part when joint `j` stands at `q[j]`: pose = parent's pose *
+    /// screw motion.
     ///
     /// # Panics
     /// When `q` is shorter than the joints.
@@ -152,8 +156,8 @@ impl KinematicTree {
     /// Checks the invariants; the message names the offending joint.
     ///
     /// # Errors
-    /// A joint names a part that is not there, a part is the child of two joints or hangs on itself,
-    /// an axis is not of unit length, or a number is not finite.
+    /// A joint names a part that is not there, a part is the child of two joints or hangs on
+    /// itself, an axis is not of unit length, or a number is not finite.
     pub fn validate(&self) -> Result<(), String> {
         let n = self.parts.len();
         let mut child_of = vec![None; n];
@@ -201,7 +205,8 @@ mod tests {
             joints: vec![hinge(0, 1, DVec3::ZERO), hinge(1, 2, DVec3::X)],
         };
         tree.validate().unwrap();
-        // Elbow bent back by 90 deg on a shoulder turned by 90 deg: the hand at (2,0,0) ends at (1,1,0).
+        // Elbow bent back by 90 deg on a shoulder turned by 90 deg: the hand at (2,0,0) ends at
+        // (1,1,0).
         let hand = tree.poses(&[FRAC_PI_2, -FRAC_PI_2])[2].apply(DVec3::X * 2.0);
         assert!((hand - DVec3::new(1.0, 1.0, 0.0)).length() < 1e-12);
     }

@@ -1,5 +1,6 @@
-//! A joint of a finished run gets a name and limits of a person's choice, and the twin is exported again. Only the
-//! stages from `joints` on run; surfaces, gaussians and joints that were found are kept.
+//! A joint of a finished run gets a name and limits of a person's choice, and the twin is exported
+//! again. Only the stages from `joints` on run; surfaces, gaussians and joints that were found are
+//! kept.
 //!
 //!     cargo run --release -p hingecast --example edit_joint -- rec run joint_1 door 0 95
 

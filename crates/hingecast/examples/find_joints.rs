@@ -1,8 +1,8 @@
 //! Joints out of depth images of your own: no run folder, no settings file, just cameras and depth.
 //!
-//! The images come out of a recording here; whatever fills a `DepthView` does as well: an OpenCV camera with its
-//! `camera_from_world`, z per pixel in any one unit, and per pixel whether it shows the object, what lies behind it,
-//! or nothing that one could know.
+//! The images come out of a recording here; whatever fills a `DepthView` does as well: an OpenCV
+//! camera with its `camera_from_world`, z per pixel in any one unit, and per pixel whether it shows
+//! the object, what lies behind it, or nothing that one could know.
 //!
 //!     cargo run --release -p hingecast --example find_joints -- rec
 

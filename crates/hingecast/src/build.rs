@@ -75,14 +75,16 @@ pub struct Options {
     pub to: Option<Stage>,
     /// Throw what an existing run has made away first.
     pub fresh: bool,
-    /// Worker threads of this build, in a pool of its own; 0 = as many as the machine has cores. The results do not depend on it.
+    /// Worker threads of this build, in a pool of its own; 0 = as many as the machine has cores.
+    /// The results do not depend on it.
     pub threads: usize,
 }
 
 /// Runs what is missing. Answers the finished run folder.
 ///
 /// # Errors
-/// A recording that cannot be built from, a folder that holds something else, disk trouble, the watcher's wish to stop.
+/// A recording that cannot be built from, a folder that holds something else, disk trouble, the
+/// watcher's wish to stop.
 pub fn build(
     recording: &Path,
     run: &Path,

@@ -1,9 +1,10 @@
-//! A PartNet-Mobility (or other) URDF -> a folder that a simulator runs: MJCF and URDF with convex collision pieces, joints, limits,
-//! masses. Says what it changed.
+//! A PartNet-Mobility (or other) URDF -> a folder that a simulator runs: MJCF and URDF with convex
+//! collision pieces, joints, limits, masses. Says what it changed.
 //!
-//! Lengths, axes and the zero of every joint stay those that `synth` records, so a twin of the object and the object itself have
-//! one base frame. Surfaces of such objects are open sheets in many shells: each shell that is small against its part (a handle,
-//! a knob) is decomposed by itself, where the voxels of the whole part would swallow it.
+//! Lengths, axes and the zero of every joint stay those that `synth` records, so a twin of the
+//! object and the object itself have one base frame. Surfaces of such objects are open sheets in
+//! many shells: each shell that is small against its part (a handle, a knob) is decomposed by
+//! itself, where the voxels of the whole part would swallow it.
 
 use crate::failure::Result;
 use glam::{DVec3, Vec3};
@@ -21,7 +22,8 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 
 /// A shell below this share of its part's diagonal is a detail with pieces of its own.
 const DETAIL: f32 = 0.35;
-/// Shells smaller than this share of the object's diagonal (screws, letters) collide with nothing that matters.
+/// Shells smaller than this share of the object's diagonal (screws, letters) collide with nothing
+/// that matters.
 const CRUMB: f64 = 0.01;
 /// The most details of a part that get pieces of their own, largest first.
 const MOST_DETAILS: usize = 24;

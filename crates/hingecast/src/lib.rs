@@ -1,7 +1,9 @@
-//! A cast of a thing, with its hinges: a recording of an articulated object becomes a twin that a simulator runs.
+//! A cast of a thing, with its hinges: a recording of an articulated object becomes a twin that a
+//! simulator runs.
 //!
-//! The library behind the command line (`crates/cli`). It has no terminal: who calls it hands in a [`Watcher`], which hears of
-//! stages and may wish them to stop, and `threads` are those of a pool of its own.
+//! The library behind the command line (`crates/cli`). It has no terminal: who calls it hands in a
+//! [`Watcher`], which hears of stages and may wish them to stop, and `threads` are those of a pool
+//! of its own.
 //!
 //! ```no_run
 //! use hingecast::{Config, Options, Preset, Silent, artifacts::TwinFile, build};
@@ -25,8 +27,8 @@
 //! | [`eval`] | a run against the truth: the only code that opens a truth folder |
 //! | [`report`] | the page of a run |
 //!
-//! Parts and joints are found by `hingecast_articulate::find`, which can be called on depth images of your own:
-//! `examples/find_joints.rs`.
+//! Parts and joints are found by `hingecast_articulate::find`, which can be called on depth images
+//! of your own: `examples/find_joints.rs`.
 
 #![warn(missing_docs)]
 // `ui` writes to the terminal, and nobody else.

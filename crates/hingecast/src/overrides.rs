@@ -1,5 +1,5 @@
-//! A person's corrections: `[[joint]]` entries of the config overrule what was found; only the stages from `joints` on
-//! run again.
+//! A person's corrections: `[[joint]]` entries of the config overrule what was found; only the
+//! stages from `joints` on run again.
 
 use crate::artifacts::Joints;
 use crate::failure::{Failure, Result};
@@ -36,7 +36,8 @@ pub struct JointOverride {
 /// Applies the entries in order.
 ///
 /// # Errors
-/// Joints or parts that are not there, axes of no length, limits upside down, a tree that hangs on itself.
+/// Joints or parts that are not there, axes of no length, limits upside down, a tree that hangs on
+/// itself.
 pub fn apply(file: &mut Joints, entries: &[JointOverride]) -> Result<()> {
     for (k, entry) in entries.iter().enumerate() {
         one(file, entry).map_err(|(what, hint)| Failure::new(what, format!("[[joint]] number {}", k + 1), hint))?;

@@ -1,4 +1,5 @@
-//! Which files of a run folder are hingecast's, and whether those of a finished stage are still what the stage wrote.
+//! Which files of a run folder are hingecast's, and whether those of a finished stage are still
+//! what the stage wrote.
 
 use crate::failure::{Failure, Result};
 use hingecast_geom::folder::may_be_emptied;
@@ -13,7 +14,8 @@ use xxhash_rust::xxh3::xxh3_128;
 pub const STAMP: &str = "stamp";
 /// A fit that is not over.
 const CHECKPOINT: &str = "checkpoint.bin";
-/// Locked by the build that is at work. It stays: to remove it would let two builds lock two files of one name.
+/// Locked by the build that is at work. It stays: to remove it would let two builds lock two files
+/// of one name.
 const LOCK: &str = ".lock";
 const HINT: &str = "move it elsewhere, or give a new folder: hingecast build RECORDING -o RUN";
 
@@ -24,7 +26,8 @@ pub struct FileRecord {
     pub name: String,
     /// Length of the file.
     pub bytes: u64,
-    /// XXH3 of the content, 32 hex digits. The whole of it: 60 MB take some 10 ms where the system has just read or written them.
+    /// XXH3 of the content, 32 hex digits. The whole of it: 60 MB take some 10 ms where the system
+    /// has just read or written them.
     pub xxh3: String,
 }
 
@@ -114,7 +117,8 @@ pub fn may_empty_run(root: &Path) -> Result<()> {
     Ok(may_be_emptied("run folder", root, &ours, HINT)?)
 }
 
-/// Whether nothing but the beginning of a build that was killed is in `root`; also where there is no such folder.
+/// Whether nothing but the beginning of a build that was killed is in `root`; also where there is
+/// no such folder.
 ///
 /// # Errors
 /// It is no folder, or one that cannot be read.
@@ -126,7 +130,8 @@ pub fn is_bare(root: &Path) -> Result<bool> {
     }
 }
 
-/// Keeps a second build out of a run folder, for as long as it lives; the system lets go of it when the process ends, however it ends.
+/// Keeps a second build out of a run folder, for as long as it lives; the system lets go of it when
+/// the process ends, however it ends.
 pub struct RunLock {
     _file: File,
 }

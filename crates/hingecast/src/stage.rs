@@ -1,7 +1,8 @@
 //! The run folder: which stages are done, by stamp, and what is remembered of the run.
 //!
-//! A stage's stamp is a hash of what it depends on (the recording's fingerprint, its own settings, the stamp of
-//! the stage before, the format version). Same stamp: the stage is kept. So the same command resumes.
+//! A stage's stamp is a hash of what it depends on (the recording's fingerprint, its own settings,
+//! the stamp of the stage before, the format version). Same stamp: the stage is kept. So the same
+//! command resumes.
 
 use crate::failure::{Failure, Result};
 use crate::run_files::{self, FileRecord, STAMP, files_of, unchanged};
@@ -66,8 +67,8 @@ pub struct RunFolder {
 }
 
 impl RunFolder {
-    /// Whether a build may write into `root`: it is new, empty, or a run, which is what has a `run.json` of ours. Many a project has
-    /// folders named parts and report, and a config.toml.
+    /// Whether a build may write into `root`: it is new, empty, or a run, which is what has a
+    /// `run.json` of ours. Many a project has folders named parts and report, and a config.toml.
     ///
     /// # Errors
     /// It holds something else.
@@ -79,7 +80,8 @@ impl RunFolder {
         Err(Failure::new("the run folder holds something else", root.display().to_string(), hint))
     }
 
-    /// Opens a run, or starts one: `run.json` is the first file in it, so that a run that is killed is known for one.
+    /// Opens a run, or starts one: `run.json` is the first file in it, so that a run that is killed
+    /// is known for one.
     ///
     /// # Errors
     /// The folder holds something else, or the disk refuses.
@@ -92,13 +94,15 @@ impl RunFolder {
         Ok(run)
     }
 
-    /// Throws away what is there: the files that hingecast writes into a run, and only if there are no others.
+    /// Throws away what is there: the files that hingecast writes into a run, and only if there are
+    /// no others.
     ///
     /// # Errors
     /// There is another file, or the disk refuses.
     pub fn empty(&mut self) -> Result<()> {
         run_files::may_empty_run(&self.root)?;
-        // Before anything goes; and run.json stays, or what is left of a killed one would be no run.
+        // Before anything goes; and run.json stays, or what is left of a killed one would be no
+        // run.
         self.record = RunRecord::default();
         self.save()?;
         for name in run_files::FOLDERS {
@@ -140,8 +144,9 @@ impl RunFolder {
         self.record.stages.iter().any(|s| s.name == stage)
     }
 
-    /// Drops the stage and all later ones from the record; then empties its folder, unless that holds a checkpoint of the same stamp
-    /// (`redo`: also then). In this order: killed in between, half a stage is never taken for a whole one.
+    /// Drops the stage and all later ones from the record; then empties its folder, unless that
+    /// holds a checkpoint of the same stamp (`redo`: also then). In this order: killed in between,
+    /// half a stage is never taken for a whole one.
     ///
     /// # Errors
     /// The folder holds a file that hingecast does not write, or the disk refuses.

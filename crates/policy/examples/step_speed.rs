@@ -1,5 +1,6 @@
-//! Milliseconds per training step. `scripts/policy_reference.py speed` runs it in turns with PyTorch: for every line on stdin
-//! it takes as many steps as the line says and answers with the milliseconds of one.
+//! Milliseconds per training step. `scripts/policy_reference.py speed` runs it in turns with
+//! PyTorch: for every line on stdin it takes as many steps as the line says and answers with the
+//! milliseconds of one.
 //!
 //!     cargo run --release -p hingecast-policy --example step_speed -- HIDDEN THREADS
 

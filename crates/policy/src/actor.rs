@@ -1,4 +1,5 @@
-//! A policy in one rollout: hidden state, the step at which it is forgotten, and the dice of the mixture.
+//! A policy in one rollout: hidden state, the step at which it is forgotten, and the dice of the
+//! mixture.
 
 use crate::net::{State, sample};
 use crate::policy::Policy;
@@ -15,19 +16,21 @@ pub struct Actor<'a> {
 }
 
 impl<'a> Actor<'a> {
-    /// `seed`: of this rollout's choices among the modes of the mixture, and of its [`crate::net::EVAL_STD`] of noise.
+    /// `seed`: of this rollout's choices among the modes of the mixture, and of its
+    /// [`crate::net::EVAL_STD`] of noise.
     pub fn new(policy: &'a Policy, seed: u64) -> Self {
         Self { policy, rng: fastrand::Rng::with_seed(seed), state: policy.net.initial_state(), age: 0 }
     }
 
-    /// Forgets what was seen. The dice go on: for an episode that can be repeated alone take a new actor with its seed.
+    /// Forgets what was seen. The dice go on: for an episode that can be repeated alone take a new
+    /// actor with its seed.
     pub fn reset(&mut self) {
         self.state = self.policy.net.initial_state();
         self.age = 0;
     }
 
-    /// The next action, each number within [-1, 1] but for the noise of 1e-4. As robomimic does, the hidden state is
-    /// forgotten every `horizon` steps: in training it never grew older.
+    /// The next action, each number within [-1, 1] but for the noise of 1e-4. As robomimic does,
+    /// the hidden state is forgotten every `horizon` steps: in training it never grew older.
     ///
     /// # Errors
     /// An observation that is missing, of another size, or not finite.

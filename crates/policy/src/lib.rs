@@ -1,7 +1,7 @@
 //! Demonstrations -> behaviour cloning -> a policy that acts, and the statistics of success rates.
 //!
-//! Knows no simulator: observations and actions are plain numbers. `docs/policy.md` has the formulas and says where this
-//! follows robomimic to the digit and where it does not.
+//! Knows no simulator: observations and actions are plain numbers. `docs/policy.md` has the
+//! formulas and says where this follows robomimic to the digit and where it does not.
 
 #![warn(missing_docs)]
 
@@ -18,5 +18,6 @@ pub use demos::{Demos, Episode};
 pub use hingecast_geom::InputError as PolicyError;
 pub use policy::{Normalization, ObsKey, Policy, PolicyConfig};
 
-/// Numbers of an action: three of translation, three of rotation (axis times angle), one of the gripper; each in [-1, 1].
+/// Numbers of an action: three of translation, three of rotation (axis times angle), one of the
+/// gripper; each in [-1, 1].
 pub const ACTION_SIZE: usize = 7;

@@ -1,7 +1,8 @@
 //! A trained policy: weights, the network's shape, and how observations are prepared for it.
 //!
-//! A folder with `policy.json` (all but the weights) and `policy.safetensors` (robomimic's names, f32). Both are open formats;
-//! weights of another program with the same names and shapes can be put in place.
+//! A folder with `policy.json` (all but the weights) and `policy.safetensors` (robomimic's names,
+//! f32). Both are open formats; weights of another program with the same names and shapes can be
+//! put in place.
 
 use crate::PolicyError;
 use crate::net::{NetConfig, Network};
@@ -192,8 +193,8 @@ pub(crate) fn normalized(x: &[f64], by: Option<&Normalization>) -> Vec<f32> {
     }
 }
 
-/// The network's tensors under its names, each group with a prefix of its own; and one more tensor with one note, since
-/// several notes would come out in a different order every time.
+/// The network's tensors under its names, each group with a prefix of its own; and one more tensor
+/// with one note, since several notes would come out in a different order every time.
 pub(crate) fn tensors_to_bytes(
     net: &Network,
     groups: &[(&str, &[f32])],
@@ -226,7 +227,8 @@ pub(crate) fn not_safetensors(path: &Path, e: impl std::fmt::Display) -> PolicyE
     )
 }
 
-/// All of the network's tensors out of a file; others in it are ignored (robomimic's checkpoints hold some twice).
+/// All of the network's tensors out of a file; others in it are ignored (robomimic's checkpoints
+/// hold some twice).
 pub(crate) fn parameters_from(
     net: &Network,
     file: &SafeTensors,

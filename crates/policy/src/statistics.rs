@@ -1,4 +1,5 @@
-//! How sure a success rate is, and a difference of two rates measured on the same episodes. All intervals are 95 %.
+//! How sure a success rate is, and a difference of two rates measured on the same episodes. All
+//! intervals are 95 %.
 //!
 //! ```text
 //! Wilson 1927, k of n, p = k/n:     (p + z^2/2n +- z sqrt(p (1-p)/n + z^2/4n^2)) / (1 + z^2/n)
@@ -6,9 +7,9 @@
 //! Tango 1998, all D with            |b - c - n D| / sqrt(n (2 q + D (1-D))) <= z,
 //!     q = (sqrt(B^2 - 4AC) - B) / 2A,  A = 2n,  B = (2n - b + c) D - b - c,  C = -c D (1-D)
 //! ```
-//! b: episodes that only the first won, c: only the second, D: the true difference, q: the most likely probability of c given
-//! D. Tango's score interval is the one that Fagerland, Lydersen and Laake (2013) recommend beside McNemar's test; it keeps its
-//! width where no episode differs.
+//! b: episodes that only the first won, c: only the second, D: the true difference, q: the most
+//! likely probability of c given D. Tango's score interval is the one that Fagerland, Lydersen and
+//! Laake (2013) recommend beside McNemar's test; it keeps its width where no episode differs.
 
 use serde::Serialize;
 
@@ -58,7 +59,8 @@ pub struct Comparison {
     pub difference: f64,
     /// Tango's interval of it.
     pub interval: [f64; 2],
-    /// McNemar's exact two-sided P: how often chance alone would make the two differ at least as much.
+    /// McNemar's exact two-sided P: how often chance alone would make the two differ at least as
+    /// much.
     pub p_value: f64,
 }
 
@@ -155,8 +157,9 @@ mod tests {
         Paired { both, only_first, only_second, neither }.compare()
     }
 
-    /// Fagerland, Lydersen and Laake, BMC Medical Research Methodology 13 (2013) 91, and their R package
-    /// `contingencytables`: Bentur et al. 2009 (1, 1, 7, 12), Cavo et al. 2012 (59, 6, 16, 80).
+    /// Fagerland, Lydersen and Laake, BMC Medical Research Methodology 13 (2013) 91, and their R
+    /// package `contingencytables`: Bentur et al. 2009 (1, 1, 7, 12), Cavo et al. 2012 (59, 6, 16,
+    /// 80).
     #[test]
     fn paired_tables_as_published() {
         let bentur = paired(1, 1, 7, 12);
@@ -187,7 +190,8 @@ mod tests {
         }
     }
 
-    /// Over all tables of 12 episodes with equal true rates the exact test rejects at 5 % no more than 5 % of the time.
+    /// Over all tables of 12 episodes with equal true rates the exact test rejects at 5 % no more
+    /// than 5 % of the time.
     #[test]
     fn mcnemar_keeps_its_level() {
         for n in [6usize, 12, 40, 2000] {

@@ -148,7 +148,8 @@ fn no_file_and_no_hdf5_are_told_apart() {
     assert_eq!(read(&path).unwrap_err().what, "not an HDF5 file");
 }
 
-/// Cut off anywhere, or with any byte changed: an error or a reading, never a panic or an endless one.
+/// Cut off anywhere, or with any byte changed: an error or a reading, never a panic or an endless
+/// one.
 #[test]
 fn damaged_files_do_not_panic() {
     let dir = tempfile::tempdir().unwrap();
@@ -179,7 +180,8 @@ fn damaged_files_do_not_panic() {
     assert!(refused > 300, "{refused}");
 }
 
-/// HINGECAST_PYTHON names an interpreter with h5py, torch and robomimic: their loader reads our file.
+/// HINGECAST_PYTHON names an interpreter with h5py, torch and robomimic: their loader reads our
+/// file.
 #[test]
 fn robomimic_reads_what_we_write() {
     let Ok(python) = std::env::var("HINGECAST_PYTHON") else {

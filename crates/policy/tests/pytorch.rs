@@ -1,5 +1,6 @@
-//! Numbers from robomimic's actor network and PyTorch's Adam: weights by name, first gradient, 200 losses on the same batches,
-//! weights at the end, and what the trained network says of observations. `scripts/policy_reference.py curve` writes the files.
+//! Numbers from robomimic's actor network and PyTorch's Adam: weights by name, first gradient, 200
+//! losses on the same batches, weights at the end, and what the trained network says of
+//! observations. `scripts/policy_reference.py curve` writes the files.
 
 use hingecast_policy::net::{Adam, Batch, NetConfig, Network, Workspace};
 use hingecast_policy::{Actor, ObsKey, Policy, PolicyConfig};
@@ -77,7 +78,8 @@ fn compare(path: &Path) {
     let far = moved.iter().zip(&parameters).fold(0.0f32, |m, (a, b)| m.max((a - b).abs()));
     assert!(f64::from(far) < 5.0 * reference.note("rate"), "weights differ by {far}");
 
-    // The trained weights, put into a policy by their names, say what robomimic's network says in evaluation.
+    // The trained weights, put into a policy by their names, say what robomimic's network says in
+    // evaluation.
     let obs = vec![ObsKey { key: "object".into(), width: inputs }];
     let policy = Policy::new(PolicyConfig::new(obs, steps, config, None, 200), moved);
     let dir = tempfile::tempdir().unwrap();
@@ -108,8 +110,8 @@ fn two_hundred_steps_as_pytorch_takes_them() {
     compare(Path::new("tests/data/curve.safetensors"));
 }
 
-/// The same at full size (19 -> 400 -> 400, batch 100, sequence 10, robomimic's settings for Lift). HINGECAST_PYTHON names an
-/// interpreter with torch and robomimic.
+/// The same at full size (19 -> 400 -> 400, batch 100, sequence 10, robomimic's settings for Lift).
+/// HINGECAST_PYTHON names an interpreter with torch and robomimic.
 #[test]
 fn two_hundred_steps_at_full_size() {
     let Ok(python) = std::env::var("HINGECAST_PYTHON") else {

@@ -1,4 +1,5 @@
-//! Training as a whole: it learns, resumes to the same bytes, saves what acts the same, refuses what it cannot use.
+//! Training as a whole: it learns, resumes to the same bytes, saves what acts the same, refuses
+//! what it cannot use.
 
 use hingecast_geom::Progress;
 use hingecast_policy::net::Head;
@@ -9,8 +10,8 @@ use std::path::Path;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 
-/// What the demonstrator does: steers the first number to zero; the second says only in the first three steps which way the
-/// gripper goes, so it must be remembered.
+/// What the demonstrator does: steers the first number to zero; the second says only in the first
+/// three steps which way the gripper goes, so it must be remembered.
 fn expert(seed: u64, steps: usize) -> Episode {
     let mut rng = fastrand::Rng::with_seed(seed);
     let (mut x, grip) = (2.0 * rng.f64() - 1.0, if rng.bool() { 1.0 } else { -1.0 });

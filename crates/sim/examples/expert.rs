@@ -1,4 +1,5 @@
-//! How often the demonstrator succeeds: `cargo run --release --example expert -- OBJECT [open|close|hinged-box] [EPISODES]`.
+//! How often the demonstrator succeeds: `cargo run --release --example expert -- OBJECT
+//! [open|close|hinged-box] [EPISODES]`.
 
 use hingecast_sim::trial::{demonstrate, make_task};
 use hingecast_sim::{Env, Outcome, Scene, SceneConfig, TaskKind, object};

@@ -1,5 +1,6 @@
-//! Control steps per second: `cargo run --release --example speed -- [OBJECT] [SECONDS]`, on one thread and on two.
-//! scripts/robosuite_speed.py measures robosuite's Python environment in the same way.
+//! Control steps per second: `cargo run --release --example speed -- [OBJECT] [SECONDS]`, on one
+//! thread and on two. scripts/robosuite_speed.py measures robosuite's Python environment in the
+//! same way.
 
 use hingecast_sim::trial::make_task;
 use hingecast_sim::{Env, Scene, SceneConfig, TaskKind, object};
@@ -24,7 +25,8 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     Ok(())
 }
 
-/// Random actions, a new episode every 200 steps, observations taken: what a rollout costs without its policy.
+/// Random actions, a new episode every 200 steps, observations taken: what a rollout costs without
+/// its policy.
 fn work(mut env: Env, seed: u64, seconds: f64) -> usize {
     let mut rng = fastrand::Rng::with_seed(seed);
     let start = Instant::now();

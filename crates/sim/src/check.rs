@@ -1,5 +1,5 @@
-//! Loads a model, drives every joint over its range, lets it rest for two seconds, and notes what goes wrong
-//! (metrics.md, "Simulator").
+//! Loads a model, drives every joint over its range, lets it rest for two seconds, and notes what
+//! goes wrong (metrics.md, "Simulator").
 
 use crate::object::joint_range;
 use crate::{SimError, log};
@@ -162,7 +162,8 @@ fn sweep(model: &MjModel, joint: usize, config: &CheckConfig, all_finite: &mut b
         reached: 0.0,
         worst_lag: 0.0,
     };
-    // Computed-torque servo: bias forces are cancelled, the error obeys a critically damped 10 Hz spring.
+    // Computed-torque servo: bias forces are cancelled, the error obeys a critically damped 10 Hz
+    // spring.
     let omega = std::f64::consts::TAU * 10.0;
     let mut mass = vec![0.0; nv * nv];
     for k in 0..=steps {

@@ -1,7 +1,9 @@
-//! Operational-space control of the arm: from a wanted pose of the grip site to joint torques, every 2 ms.
+//! Operational-space control of the arm: from a wanted pose of the grip site to joint torques,
+//! every 2 ms.
 //!
-//! O. Khatib, "A unified approach for motion and force control of robot manipulators", 1987, in the form of robosuite's
-//! OSC_POSE (uncoupled position and orientation, null space towards the starting posture):
+//! O. Khatib, "A unified approach for motion and force control of robot manipulators", 1987, in the
+//! form of robosuite's OSC_POSE (uncoupled position and orientation, null space towards the
+//! starting posture):
 //!
 //! ```text
 //! F   = kp (x* - x) - kd v          kp = 150 1/s^2, kd = 2 sqrt(kp)
@@ -9,7 +11,8 @@
 //! Lp  = (Jp M^-1 Jp')^-1, Lo = (Jo M^-1 Jo')^-1, L = (J M^-1 J')^-1, Jbar = M^-1 J' L
 //! u   = clip(J' [Lp F; Lo tau] + bias + (I - Jbar J)' M (kn (q0 - q) - 2 sqrt(kn) qdot)),   kn = 10
 //! ```
-//! World frame, metres, radians; J = [Jp; Jo] is 6 x 7. `tests/control.rs` compares with the formulas written out in full.
+//! World frame, metres, radians; J = [Jp; Jo] is 6 x 7. `tests/control.rs` compares with the
+//! formulas written out in full.
 
 use glam::{DMat3, DVec3};
 
@@ -60,7 +63,8 @@ pub fn torques(arm: &ArmState, goal: &Goal, posture: &[f64; N]) -> [f64; N] {
     let error = [goal.position - arm.position, e].map(|v| v.to_array()).concat();
     let acceleration: [f64; 6] = std::array::from_fn(|r| KP * error[r] - kd * velocity[r]);
 
-    // Inverse task inertia A = J M^-1 J', once for all three of its uses. X = M^-1 J' is kept: Jbar = X L.
+    // Inverse task inertia A = J M^-1 J', once for all three of its uses. X = M^-1 J' is kept: Jbar
+    // = X L.
     let factor = Cholesky::<N>::new(&arm.mass);
     let x: [[f64; N]; 6] = std::array::from_fn(|r| factor.solve(&arm.jacobian[r]));
     let a: [[f64; 6]; 6] = std::array::from_fn(|r| std::array::from_fn(|c| dot(&arm.jacobian[r], &x[c])));
@@ -104,7 +108,8 @@ impl<const K: usize> Cholesky<K> {
                 for k in 0..c {
                     sum -= g[r][k] * g[c][k];
                 }
-                // At a singular posture (a stretched arm) a pivot goes to 0: the floor bounds the force there.
+                // At a singular posture (a stretched arm) a pivot goes to 0: the floor bounds the
+                // force there.
                 g[r][c] = if r == c { sum.max(1e-12).sqrt() } else { sum / g[c][c] };
             }
         }

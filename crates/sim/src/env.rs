@@ -1,8 +1,10 @@
-//! One environment: reset from a seed, 20 control steps a second, observations under robomimic's names, success, states.
+//! One environment: reset from a seed, 20 control steps a second, observations under robomimic's
+//! names, success, states.
 //!
-//! A step of 50 ms is 25 steps of physics. On the first, the goal is set: x* = x + 0.05 a[0..3] (m),
-//! R* = exp(0.5 a[3..6]) R (rad), and the fingers' target moves by a tenth of its range towards closed (a[6] > 0) or open;
-//! then `control::torques` every 2 ms. Same scene, seed and actions: same states, to the bit.
+//! A step of 50 ms is 25 steps of physics. On the first, the goal is set: x* = x + 0.05 a[0..3]
+//! (m), R* = exp(0.5 a[3..6]) R (rad), and the fingers' target moves by a tenth of its range
+//! towards closed (a[6] > 0) or open; then `control::torques` every 2 ms. Same scene, seed and
+//! actions: same states, to the bit.
 
 mod moment;
 
@@ -34,8 +36,8 @@ const START: [f64; N] = [0.0, PI / 16.0, 0.0, -5.0 * PI / 6.0, 0.0, PI - 0.2, PI
 const START_NOISE: f64 = 0.02;
 /// Fingers at reset, m: half open.
 const START_FINGER: f64 = 0.020833;
-/// The gripper points down at reset. A quaternion and its negative are one rotation; the sign that is nearer to this one is
-/// shown, so that observations never jump.
+/// The gripper points down at reset. A quaternion and its negative are one rotation; the sign that
+/// is nearer to this one is shown, so that observations never jump.
 pub(crate) const GRIPPER_DOWN: DQuat = DQuat::from_xyzw(1.0, 0.0, 0.0, 0.0);
 /// A free base that went so far has been knocked away, m.
 const KNOCKED: f64 = 0.1;
@@ -110,7 +112,8 @@ impl Env {
         env
     }
 
-    /// A new episode: the object's place, the joint's value (task `close`) and the arm's posture come from `seed`.
+    /// A new episode: the object's place, the joint's value (task `close`) and the arm's posture
+    /// come from `seed`.
     pub fn reset(&mut self, seed: u64) {
         let mut rng = fastrand::Rng::with_seed(seed ^ 0x6570_6973_6f64_6531);
         let (scene, ids) = (&self.scene, &self.scene.ids);
@@ -189,7 +192,8 @@ impl Env {
             ctrl[N + 1] = -0.02 + 0.02 * self.gripper[1];
             self.data.step2();
         }
-        // Poses belong to the new state from here on; no solver runs, so the next step is not touched by it.
+        // Poses belong to the new state from here on; no solver runs, so the next step is not
+        // touched by it.
         self.data.kinematics();
         self.look_at_contacts();
         Ok(())
@@ -239,8 +243,8 @@ impl Env {
         }
     }
 
-    /// How far the joint is from closed, as a share of the *task's* range: that of the object which the task was made from, whatever
-    /// limits this world's joint has.
+    /// How far the joint is from closed, as a share of the *task's* range: that of the object which
+    /// the task was made from, whatever limits this world's joint has.
     pub fn moved(&self) -> f64 {
         let t = &self.scene.target;
         (self.data.qpos()[t.joint.qpos] - t.closed) * (t.open - t.closed).signum() / self.scene.task.travel
@@ -271,8 +275,8 @@ impl Env {
         }
     }
 
-    /// How far the grasped spot of the part is from the way on which the joint of `truth` would lead it, m; infinite once the
-    /// simulation has diverged.
+    /// How far the grasped spot of the part is from the way on which the joint of `truth` would
+    /// lead it, m; infinite once the simulation has diverged.
     pub fn off(&self, truth: &SpotPath) -> f64 {
         if !self.finite {
             return f64::INFINITY;
@@ -286,8 +290,9 @@ impl Env {
         truth.off(world_from_base.inverse().apply(self.grasp().trans))
     }
 
-    /// robomimic's low-dimensional keys: `object` (grasp frame: position, quaternion xyzw; from the gripper to it),
-    /// `robot0_eef_pos`, `robot0_eef_quat` (xyzw), `robot0_gripper_qpos`. World frame, metres.
+    /// robomimic's low-dimensional keys: `object` (grasp frame: position, quaternion xyzw; from the
+    /// gripper to it), `robot0_eef_pos`, `robot0_eef_quat` (xyzw), `robot0_gripper_qpos`. World
+    /// frame, metres.
     pub fn observe(&self) -> BTreeMap<String, Vec<f64>> {
         let (grip, grasp) = (self.grip(), self.grasp());
         let mut object = grasp.trans.to_array().to_vec();

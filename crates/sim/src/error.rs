@@ -1,4 +1,5 @@
-//! Why a simulation cannot start, in three lines each. What a working model does wrong is a doubt or a failed episode.
+//! Why a simulation cannot start, in three lines each. What a working model does wrong is a doubt
+//! or a failed episode.
 
 /// What / where / what to try.
 #[derive(Debug, Clone, thiserror::Error)]

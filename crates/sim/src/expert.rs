@@ -1,6 +1,7 @@
-//! A scripted demonstrator: hovers, comes down, closes, follows the joint's way. It knows the joint's screw and the grasp frame of
-//! the object in front of it, and has a person's imperfections: its own speed, approach and hover height in every episode, pauses,
-//! noise on every action, and a second try when the part slips.
+//! A scripted demonstrator: hovers, comes down, closes, follows the joint's way. It knows the
+//! joint's screw and the grasp frame of the object in front of it, and has a person's
+//! imperfections: its own speed, approach and hover height in every episode, pauses, noise on every
+//! action, and a second try when the part slips.
 
 use crate::env::{ACTION, Env};
 use crate::task::TaskKind;
@@ -74,8 +75,8 @@ impl Expert {
     }
 
     fn decide(&mut self, env: &Env, grip: &Pose, grasp: &Pose) -> [f64; ACTION] {
-        // The hand comes along the grasp's z. A part that stands half open (task `close`) is met with the wrist as it would be
-        // when closed, unless the wrist turns with the part.
+        // The hand comes along the grasp's z. A part that stands half open (task `close`) is met
+        // with the wrist as it would be when closed, unless the wrist turns with the part.
         let task = &env.scene.task;
         let rot = if task.turn_wrist { grasp.rot } else { self.level(env, grasp) };
         let aim = Pose::new(rot, grasp.trans);
@@ -136,7 +137,8 @@ impl Expert {
         }
     }
 
-    /// The orientation of the hand for a part that the wrist does not follow: as if the part were closed.
+    /// The orientation of the hand for a part that the wrist does not follow: as if the part were
+    /// closed.
     fn level(&self, env: &Env, grasp: &Pose) -> DQuat {
         let screw = env.screw();
         let back = env.scene.target.closed - env.joint_value();
@@ -169,7 +171,8 @@ impl Expert {
 
     /// Drives the grip site to `to`; `limit` bounds every number.
     fn towards(&self, grip: &Pose, to: &Pose, limit: f64, fingers: f64) -> [f64; ACTION] {
-        // The arm covers about 15 mm in a step of full action (50 mm): more gain gets it there sooner, less overshoots less.
+        // The arm covers about 15 mm in a step of full action (50 mm): more gain gets it there
+        // sooner, less overshoots less.
         let v = (to.trans - grip.trans) * (1.6 / 0.05);
         let v = v * (limit / v.length().max(limit));
         let w = rotation_vector(to.rot * grip.rot.inverse()) * (0.8 / 0.5);

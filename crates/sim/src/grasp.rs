@@ -1,11 +1,13 @@
 //! Where on the moving part a parallel gripper can close, found from collision geometry alone.
 //!
-//! For every way to come (from above, or leaning from four sides) and every direction to close in, rays ask a grid over the
-//! part: what is met first, and how thick is it a little deeper? Where both fingers would meet the moving part, the open hand
-//! is put there, on the way there, and along the joint's way, and MuJoCo says whether it collides.
+//! For every way to come (from above, or leaning from four sides) and every direction to close in,
+//! rays ask a grid over the part: what is met first, and how thick is it a little deeper? Where
+//! both fingers would meet the moving part, the open hand is put there, on the way there, and along
+//! the joint's way, and MuJoCo says whether it collides.
 //!
-//! A hinge turns its part, and a hand that does not turn with it needs a place that may turn between the fingers: one where the
-//! closing direction lies along the axis. Elsewhere the wrist turns with the part.
+//! A hinge turns its part, and a hand that does not turn with it needs a place that may turn
+//! between the fingers: one where the closing direction lies along the axis. Elsewhere the wrist
+//! turns with the part.
 
 use crate::SimError;
 use crate::object::{self, ObjectJoint, bounds, hangs_on, write_pose};
@@ -25,7 +27,8 @@ const WIDEST: f64 = 0.07;
 const THINNEST: f64 = 0.003;
 /// Half of what the hand opens, m: where the pads' inner faces are then.
 const HALF_OPEN: f64 = 0.04;
-/// Points of a finger's inner face, wide open, in the grip's frame: across, along the approach, from the middle, m (gripper.xml).
+/// Points of a finger's inner face, wide open, in the grip's frame: across, along the approach,
+/// from the middle, m (gripper.xml).
 const FINGER: [[f64; 3]; 8] = [
     [-0.0085, 0.0088, HALF_OPEN],
     [0.0085, 0.0088, HALF_OPEN],
@@ -36,12 +39,13 @@ const FINGER: [[f64; 3]; 8] = [
     [-0.0105, -0.045, 0.046],
     [0.0105, -0.045, 0.046],
 ];
-/// How deep the pads' middle may sit below the surface that is met first, m. The pads reach 9 mm farther.
+/// How deep the pads' middle may sit below the surface that is met first, m. The pads reach 9 mm
+/// farther.
 const DEPTHS: [f64; 3] = [0.008, 0.016, 0.024];
 /// The same for small pieces, m: enough to hold.
 const TIPS: f64 = 0.003;
-/// How far the hand may lean back from pointing down when it comes from a side, rad. The sixth joint ends at 3.75 rad, 0.8 beyond
-/// the start; a level hand needs the fifth joint at its stop.
+/// How far the hand may lean back from pointing down when it comes from a side, rad. The sixth
+/// joint ends at 3.75 rad, 0.8 beyond the start; a level hand needs the fifth joint at its stop.
 const TILTS: [f64; 5] = [0.5, 0.75, 1.0, 1.3, FRAC_PI_2];
 /// The last stretch of the approach must be free, m.
 const APPROACH: [f64; 3] = [0.0, 0.04, 0.09];
@@ -49,17 +53,20 @@ const APPROACH: [f64; 3] = [0.0, 0.04, 0.09];
 const ALONG: [f64; 3] = [0.2, 0.4, 0.6];
 /// Overlap that contact may have there, m: the part rocks between the pads.
 const ROCKING: f64 = 0.004;
-/// Longest way of the grasp to 60 % of the range, m: beyond it the arm would have to reach around the object.
+/// Longest way of the grasp to 60 % of the range, m: beyond it the arm would have to reach around
+/// the object.
 const LONGEST_WAY: f64 = 0.25;
 /// Highest grasp above the table on that way, m.
 const HIGHEST: f64 = 0.4;
 /// Largest diagonal of the object, m.
 const LARGEST: f64 = 0.75;
-/// Where the middle of the way shall be on the table, m from its centre towards the far side: in front of the arm with room on
-/// both sides. The covered box comes out at simulation.md's x 0..0.06.
+/// Where the middle of the way shall be on the table, m from its centre towards the far side: in
+/// front of the arm with room on both sides. The covered box comes out at simulation.md's x
+/// 0..0.06.
 const MIDDLE: f64 = 0.0305;
 
-/// A hand that leans stands between the arm and the grasp: so much farther away the object is put when it lies level, m.
+/// A hand that leans stands between the arm and the grasp: so much farther away the object is put
+/// when it lies level, m.
 const BEHIND: f64 = 0.12;
 
 /// One place to hold, with the object's turn on the table.
@@ -145,7 +152,8 @@ fn two_digits(s: f64) -> f64 {
     (s / unit).floor() * unit
 }
 
-/// At most 1; so that the farthest point of the part neither travels nor stands beyond what the arm does with ease.
+/// At most 1; so that the farthest point of the part neither travels nor stands beyond what the arm
+/// does with ease.
 fn reachable_scale(data: &mut Probe, hand: Hand, joint: &ObjectJoint) -> f64 {
     let (closed, open) = ends(data, hand, joint);
     pose_joint(data, joint, closed);
@@ -185,7 +193,8 @@ fn at_scale(path: &Path, kind: TaskKind, name: &str, scale: f64) -> Result<Vec<C
     Ok(out)
 }
 
-/// Closed is the end at which the object is more compact; where both are alike, the one nearer to the recorded zero.
+/// Closed is the end at which the object is more compact; where both are alike, the one nearer to
+/// the recorded zero.
 fn ends(data: &mut Probe, hand: Hand, joint: &ObjectJoint) -> (f64, f64) {
     let volume = joint.range.map(|q| {
         pose_joint(data, joint, q);
@@ -244,7 +253,8 @@ impl Search {
         let (nu, nv) = ((hu / step).ceil() as i32, (hv / step).ceil() as i32);
         // A place that was judged before may have left the part half open.
         pose_joint(data, &self.joint, self.closed);
-        // First pass: where would the fingers meet the part on both sides? Handles and knobs are smaller than the grid's step.
+        // First pass: where would the fingers meet the part on both sides? Handles and knobs are
+        // smaller than the grid's step.
         let mut places = self.details(data, approach, closing);
         let mut hits: Vec<(i32, i32, DVec3, f64)> = Vec::new();
         for u in -nu..=nu {
@@ -273,7 +283,8 @@ impl Search {
         out
     }
 
-    /// Follows a ray to the part and measures its thickness a little deeper: the middle between the fingers, and the width.
+    /// Follows a ray to the part and measures its thickness a little deeper: the middle between the
+    /// fingers, and the width.
     fn pinch(&self, data: &mut Probe, from: DVec3, approach: DVec3, closing: DVec3) -> Option<(DVec3, f64)> {
         let met = self.ray(data, from, approach)?;
         // Deepest first: a better hold, where there is one.
@@ -289,8 +300,8 @@ impl Search {
         ((THINNEST..=WIDEST).contains(&width)).then_some((middle, width))
     }
 
-    /// Places on the part's own small pieces (bars, knobs): in their middle, and just below the face that is met first, where the tips
-    /// of the fingers need less room behind.
+    /// Places on the part's own small pieces (bars, knobs): in their middle, and just below the
+    /// face that is met first, where the tips of the fingers need less room behind.
     fn details(&self, data: &mut Probe, approach: DVec3, closing: DVec3) -> Vec<(DVec3, f64, f64)> {
         let side = approach.cross(closing);
         let pieces: Vec<[DVec3; 2]> = {
@@ -317,7 +328,8 @@ impl Search {
         out
     }
 
-    /// Distance to the moving part, if it is the first thing met. A start inside a solid meets nothing.
+    /// Distance to the moving part, if it is the first thing met. A start inside a solid meets
+    /// nothing.
     fn ray(&self, data: &mut Probe, from: DVec3, direction: DVec3) -> Option<f64> {
         let groups = [1, 1, 1, 1, 1, 0];
         let (geom, distance) = data.ray(&from.to_array(), &direction.to_array(), Some(&groups), true, None, None);
@@ -330,7 +342,8 @@ impl Search {
         if self.screw.kind == JointKind::Prismatic || along_axis > 0.9 { vec![false] } else { vec![true] }
     }
 
-    /// Does the open hand fit there, on the way there and along the joint's way? Then: how good is it?
+    /// Does the open hand fit there, on the way there and along the joint's way? Then: how good is
+    /// it?
     fn judge(
         &self,
         data: &mut Probe,
@@ -397,19 +410,21 @@ impl Search {
         Some(Candidate { task, score })
     }
 
-    /// Which side of the object faces the arm: the hand comes from above or away from the arm, and the way leads towards
-    /// the arm, or else the wrist has to bend back on itself.
+    /// Which side of the object faces the arm: the hand comes from above or away from the arm, and
+    /// the way leads towards the arm, or else the wrist has to bend back on itself.
     fn best_yaw(&self, grasp: &Pose, way: DVec3) -> Option<f64> {
         let yaws = (0..4).map(|k| k as f64 * FRAC_PI_2);
         let approach = grasp.rotate(DVec3::Z);
         let fine = yaws.filter(|&y| approach.z < -0.99 || (DQuat::from_rotation_z(y) * approach).x > 0.3);
-        // Doors swing more outwards than sideways: the larger component decides, as rounding to quarter turns does.
+        // Doors swing more outwards than sideways: the larger component decides, as rounding to
+        // quarter turns does.
         let towards = |yaw: f64| -(DQuat::from_rotation_z(yaw) * way).x;
         fine.max_by(|a, b| towards(*a).total_cmp(&towards(*b)))
     }
 
-    /// Nothing but the part stands in the fingers' way when they close: rays from the corners of pads and shafts inwards, as far as
-    /// the part's surface. A lip of the case behind a door's edge would stop one finger, and the hand would pull at the case.
+    /// Nothing but the part stands in the fingers' way when they close: rays from the corners of
+    /// pads and shafts inwards, as far as the part's surface. A lip of the case behind a door's
+    /// edge would stop one finger, and the hand would pull at the case.
     fn closes(&self, data: &mut Probe, grasp: &Pose, width: f64) -> bool {
         FINGER.iter().all(|&[side, along, inner]| {
             [1.0, -1.0].into_iter().all(|finger| {
@@ -423,7 +438,8 @@ impl Search {
         })
     }
 
-    /// No contact of the hand deeper than `slack`, and the hand above the table. With slack, fingers may touch the part itself.
+    /// No contact of the hand deeper than `slack`, and the hand above the table. With slack,
+    /// fingers may touch the part itself.
     fn fits(&self, data: &mut Probe, pose: &Pose, slack: f64) -> bool {
         place_gripper(data, pose);
         data.kinematics();

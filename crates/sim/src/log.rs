@@ -1,4 +1,5 @@
-//! MuJoCo prints warnings; here they are collected, so that a twin which compiles with a warning has a doubt.
+//! MuJoCo prints warnings; here they are collected, so that a twin which compiles with a warning
+//! has a doubt.
 
 use mujoco_rs::logging::set_log_handler;
 use mujoco_rs::wrappers::mj_logging::{MjLogMessage, MjtLogLevel};

@@ -29,7 +29,8 @@ pub fn model_file(path: &Path) -> Result<PathBuf, SimError> {
     })
 }
 
-/// Reads the file; `visuals` keeps what only pictures need (loading a twin's fine meshes takes seconds).
+/// Reads the file; `visuals` keeps what only pictures need (loading a twin's fine meshes takes
+/// seconds).
 pub(crate) fn read(path: &Path, visuals: bool) -> Result<MjSpec, SimError> {
     let spec = if path == Path::new(HINGED_BLOCKS) {
         MjSpec::from_xml_string(include_str!("../assets/hinged_blocks.xml"))
@@ -176,8 +177,8 @@ pub struct Target {
 }
 
 impl Target {
-    /// Recognises the task's joint by where its part is when closed: names and zeros of a twin are its own. `data` holds the
-    /// scaled object with its base frame in the world's origin.
+    /// Recognises the task's joint by where its part is when closed: names and zeros of a twin are
+    /// its own. `data` holds the scaled object with its base frame in the world's origin.
     pub(crate) fn find<M: ModelType>(data: &mut MjData<M>, task: &TaskSpec, place: &str) -> Result<Self, SimError> {
         let all = joints(data.model());
         let rest: Vec<f64> = data.qpos().to_vec();
@@ -190,8 +191,9 @@ impl Target {
                 data.kinematics();
                 let in_part = |g: usize| hangs_on(data.model(), data.model().geom_bodyid()[g] as usize, part);
                 let Some([lo, hi]) = bounds(data, in_part) else { continue };
-                // What is grasped must be there; the centre decides between parts and ends that both have something there. Not
-                // the centre alone: a twin whose drawer lost its inside to its neighbour has it elsewhere.
+                // What is grasped must be there; the centre decides between parts and ends that
+                // both have something there. Not the centre alone: a twin whose drawer lost its
+                // inside to its neighbour has it elsewhere.
                 let spot = task.grasp.trans;
                 let distance = spot.distance(spot.clamp(lo, hi)) + 0.25 * (0.5 * (lo + hi)).distance(task.part_centre);
                 let body_from_grasp = body_pose(data, part).inverse() * task.grasp;

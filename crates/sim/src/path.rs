@@ -1,8 +1,9 @@
 //! The way of the grasped spot, and whether a part ended where the true joint would have it.
 //!
-//! A compliant hand opens many a wrong hinge: that the joint moved says little about where the part now is. So besides
-//! `success` there is *as true*: at the end of the episode the grasped spot of the part lies within [`TOLERANCE`] of the
-//! way on which the true object's joint leads it, at a point of that way where the task is done. Base frame, simulated metres.
+//! A compliant hand opens many a wrong hinge: that the joint moved says little about where the part
+//! now is. So besides `success` there is *as true*: at the end of the episode the grasped spot of
+//! the part lies within [`TOLERANCE`] of the way on which the true object's joint leads it, at a
+//! point of that way where the task is done. Base frame, simulated metres.
 //!
 //! ```text
 //! hinge: spot(q) = foot + R(axis, q - closed) r       slide: spot(q) = spot + (q - closed) axis
@@ -14,8 +15,9 @@ use crate::task::{CLOSE_FROM, TaskKind, TaskSpec};
 use glam::DVec3;
 use hingecast_geom::Screw;
 
-/// Half the width of a pad, m: a hand that is sent to where the true object would have the spot still closes on it with the middle
-/// of its pads. What comes after opening (reaching in, taking over with another hand, closing again) begins with such a move.
+/// Half the width of a pad, m: a hand that is sent to where the true object would have the spot
+/// still closes on it with the middle of its pads. What comes after opening (reaching in, taking
+/// over with another hand, closing again) begins with such a move.
 pub const TOLERANCE: f64 = 0.0085;
 /// Of the spot's whole move at most this share is tolerated: what has not moved must never count.
 const SHARE: f64 = 0.25;
@@ -64,7 +66,8 @@ impl SpotPath {
     pub fn off(&self, point: DVec3) -> f64 {
         let done = self.done();
         let [lo, hi] = done.map(|share| share * self.travel);
-        // The value at which the way is nearest to the point, if the joint may stand there; else one of the two ends.
+        // The value at which the way is nearest to the point, if the joint may stand there; else
+        // one of the two ends.
         let nearest = if self.screw.kind.turns() {
             let radius = |x: DVec3| (x - self.screw.pivot).reject_from_normalized(self.screw.axis);
             let (from, to) = (radius(self.spot), radius(point));

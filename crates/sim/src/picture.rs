@@ -1,6 +1,8 @@
-//! Pictures without a graphics driver: one ray a pixel against the collision shapes, shaded by one lamp and the sky.
+//! Pictures without a graphics driver: one ray a pixel against the collision shapes, shaded by one
+//! lamp and the sky.
 //!
-//! Enough to see what an arm did, on every machine alike, and it needs no window system, GPU or GL library.
+//! Enough to see what an arm did, on every machine alike, and it needs no window system, GPU or GL
+//! library.
 
 use crate::env::Env;
 use glam::DVec3;
@@ -17,7 +19,8 @@ pub struct View {
 /// From the side: the hand comes from one end, the object faces it.
 pub const SIDE: View =
     View { eye: DVec3::new(-0.1, -1.05, 1.4), middle: DVec3::new(-0.03, 0.0, 0.95), half_height: 0.36 };
-/// From the far end of the table, near the object: how the hand stands to it across the arm, which the side does not show.
+/// From the far end of the table, near the object: how the hand stands to it across the arm, which
+/// the side does not show.
 pub const FRONT: View = View { eye: DVec3::new(0.8, 0.0, 1.2), middle: DVec3::new(0.03, 0.0, 0.95), half_height: 0.26 };
 
 const LAMP: DVec3 = DVec3::new(0.35, -0.5, 0.79);

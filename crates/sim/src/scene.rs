@@ -1,8 +1,10 @@
-//! The world of an episode: table, arm, and the object (or its twin) welded to the table where the task says.
+//! The world of an episode: table, arm, and the object (or its twin) welded to the table where the
+//! task says.
 //!
-//! The object hangs in a body that can be put anywhere between episodes without compiling again (MuJoCo calls it mocap); to
-//! the physics it is fixed. Its contents are scaled by the frame that holds them, masses and forces with it, so that a small
-//! object moves like the large one in weaker gravity would (mjSCALING_SIMILAR). An object with a free base stays free.
+//! The object hangs in a body that can be put anywhere between episodes without compiling again
+//! (MuJoCo calls it mocap); to the physics it is fixed. Its contents are scaled by the frame that
+//! holds them, masses and forces with it, so that a small object moves like the large one in weaker
+//! gravity would (mjSCALING_SIMILAR). An object with a free base stays free.
 
 use crate::object::{self, PREFIX, Target};
 use crate::spoil::{Line, Spoil};
@@ -67,7 +69,8 @@ impl Scene {
     /// # Errors
     /// When the model cannot be loaded or has no part that fits the task.
     pub fn new(config: &SceneConfig, task: &TaskSpec) -> Result<Self, SimError> {
-        // MuJoCo tells on its log that the object's options give way to the scene's; nobody wants to read that.
+        // MuJoCo tells on its log that the object's options give way to the scene's; nobody wants
+        // to read that.
         log::collect(|| Self::compile(config, task)).0
     }
 
@@ -130,7 +133,8 @@ fn check_numbers(model: &MjModel, place: &str) -> Result<(), SimError> {
 }
 
 impl Scene {
-    /// The model as MJCF with the object where it stands in one episode, to the last digit: an episode's `model_file`.
+    /// The model as MJCF with the object where it stands in one episode, to the last digit: an
+    /// episode's `model_file`.
     pub fn xml_at(&self, place: &Pose) -> String {
         let [x, y, z] = place.trans.to_array();
         let q = place.rot;
@@ -138,7 +142,8 @@ impl Scene {
         self.xml.replacen(OBJECT_BODY, &pose, 1)
     }
 
-    /// Where the object stands in a text of [`Scene::xml_at`]; the identity when it stands free and its state says where.
+    /// Where the object stands in a text of [`Scene::xml_at`]; the identity when it stands free and
+    /// its state says where.
     ///
     /// # Errors
     /// When the text has an object but no place that can be read.
@@ -160,7 +165,8 @@ impl Scene {
     }
 }
 
-/// Puts the object into a scene: in a mocap body named "object", or, when it stands free, into the world itself.
+/// Puts the object into a scene: in a mocap body named "object", or, when it stands free, into the
+/// world itself.
 pub(crate) fn attach(
     spec: &mut MjSpec,
     child: &mut MjSpec,
@@ -223,9 +229,10 @@ pub(crate) fn alone(path: &Path, scale: f64, with: Option<&str>) -> Result<MjDat
     Ok(data)
 }
 
-/// Moves the target joint of the (unscaled) specification as asked, and nothing else: closed, the part stands where it stood, whatever
-/// the file's zero is. Where the file lets the part collide with its base, a wrong hinge may jam it there; where it excludes that (as
-/// twins do), the part passes through. Answers the part's closed pose, base frame, unscaled.
+/// Moves the target joint of the (unscaled) specification as asked, and nothing else: closed, the
+/// part stands where it stood, whatever the file's zero is. Where the file lets the part collide
+/// with its base, a wrong hinge may jam it there; where it excludes that (as twins do), the part
+/// passes through. Answers the part's closed pose, base frame, unscaled.
 fn spoil(spec: &mut MjSpec, config: &SceneConfig, task: &TaskSpec) -> Result<Pose, SimError> {
     let path = &config.object;
     let mut data = alone(path, 1.0, None)?;

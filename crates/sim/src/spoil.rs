@@ -1,9 +1,11 @@
-//! Wrong on purpose: an object whose target joint is off by a known amount, to see whether a policy notices.
+//! Wrong on purpose: an object whose target joint is off by a known amount, to see whether a policy
+//! notices.
 //!
-//! All in the base frame; r points from the axis to the grasp, a is the axis, t = a x r the direction of motion there.
-//! `axis`: a turned about r (a slide: about the vertical), so that the part's motion goes sideways by that angle. `pivot`: the axis moved away from the
-//! grasp along -r. `limits`: the range cut from its open end. `edge`: the hinge on the other side of the moving part,
-//! turning the other way, as if seen in a mirror.
+//! All in the base frame; r points from the axis to the grasp, a is the axis, t = a x r the
+//! direction of motion there. `axis`: a turned about r (a slide: about the vertical), so that the
+//! part's motion goes sideways by that angle. `pivot`: the axis moved away from the grasp along -r.
+//! `limits`: the range cut from its open end. `edge`: the hinge on the other side of the moving
+//! part, turning the other way, as if seen in a mirror.
 
 use crate::SimError;
 use glam::{DQuat, DVec3};

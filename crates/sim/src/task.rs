@@ -1,8 +1,9 @@
-//! What shall be done with which joint of an object, and where the object stands: everything that the true object and its
-//! twin share, so that a policy meets both in the same place.
+//! What shall be done with which joint of an object, and where the object stands: everything that
+//! the true object and its twin share, so that a policy meets both in the same place.
 //!
-//! A twin's base frame is the canonical world frame of the recorded object (docs/simulation.md). So one `TaskSpec`, made from
-//! the true object (or from a twin alone), fits both: lengths are those of the base frame times `scale`.
+//! A twin's base frame is the canonical world frame of the recorded object (docs/simulation.md). So
+//! one `TaskSpec`, made from the true object (or from a twin alone), fits both: lengths are those
+//! of the base frame times `scale`.
 
 use glam::{DQuat, DVec3};
 use hingecast_geom::Pose;
@@ -16,7 +17,8 @@ pub enum TaskKind {
     Open,
     /// Move the joint from open to within a tenth of its range from closed.
     Close,
-    /// `open` on the seed's two blocks that stand free: it can be solved by lifting, see docs/simulation.md.
+    /// `open` on the seed's two blocks that stand free: it can be solved by lifting, see
+    /// docs/simulation.md.
     HingedBox,
 }
 
@@ -45,7 +47,8 @@ impl TaskKind {
 
 /// Height of the table top, m.
 pub const TABLE: f64 = 0.8;
-/// The covered box of simulation.md: object at x 0..0.06, y -0.03..0.03, yaw +-0.2 about its nominal place.
+/// The covered box of simulation.md: object at x 0..0.06, y -0.03..0.03, yaw +-0.2 about its
+/// nominal place.
 const SPREAD: [f64; 3] = [0.03, 0.03, 0.2];
 /// Where the joint stands at least when `close` begins, share of the range.
 pub(crate) const CLOSE_FROM: f64 = 0.6;
@@ -65,13 +68,15 @@ pub struct TaskSpec {
     pub place: Pose,
     /// Half widths of the uniform draw of x (m), y (m), yaw (rad) about `place`.
     pub spread: [f64; 3],
-    /// Where the gripper holds the moving part when the joint is closed, base frame: z approaches, y closes.
+    /// Where the gripper holds the moving part when the joint is closed, base frame: z approaches,
+    /// y closes.
     pub grasp: Pose,
     /// Thickness there, m.
     pub width: f64,
     /// Whether the wrist turns with the part.
     pub turn_wrist: bool,
-    /// Centre of the moving part's box when closed, base frame: by it a twin's joint is recognised, whatever it is called.
+    /// Centre of the moving part's box when closed, base frame: by it a twin's joint is recognised,
+    /// whatever it is called.
     pub part_centre: DVec3,
     /// |open - closed| of the joint, rad or simulated metres.
     pub travel: f64,

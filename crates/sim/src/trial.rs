@@ -1,5 +1,6 @@
-//! Makes the task of an object: geometry proposes places to hold, the demonstrator tries the best of them in the simulator, and the
-//! first that works is taken. Geometry does not know the arm's reach; a try does.
+//! Makes the task of an object: geometry proposes places to hold, the demonstrator tries the best
+//! of them in the simulator, and the first that works is taken. Geometry does not know the arm's
+//! reach; a try does.
 
 use crate::env::{Env, Outcome};
 use crate::expert::Expert;
@@ -12,7 +13,8 @@ use std::path::Path;
 
 /// Tries per place, and how many of them must succeed to look no further.
 const TRIES: u64 = 3;
-/// Sizes that are tried, times what the arm reaches with ease: a handle may be too thick for the gripper or too near to the next.
+/// Sizes that are tried, times what the arm reaches with ease: a handle may be too thick for the
+/// gripper or too near to the next.
 const SIZES: [f64; 5] = [1.0, 0.75, 1.4, 0.55, 1.8];
 
 /// What was found out on the way.
@@ -90,7 +92,8 @@ pub fn make_task(path: &Path, kind: TaskKind, joint: Option<&str>, scale: Option
     }
 }
 
-/// Whether arm and object touch where an episode begins: then the arm pushes the part, or is stuck, before it has done anything.
+/// Whether arm and object touch where an episode begins: then the arm pushes the part, or is stuck,
+/// before it has done anything.
 fn touches_arm(env: &mut Env) -> bool {
     let model = env.scene.model.clone();
     let arm = model.name_to_id(MjtObjBase::mjOBJ_BODY, "link0").expect("a body of our own arm");
@@ -102,8 +105,8 @@ fn touches_arm(env: &mut Env) -> bool {
     })
 }
 
-/// One episode of the demonstrator from `seed`; `each` sees the environment before every action. Ends at success or
-/// at the horizon.
+/// One episode of the demonstrator from `seed`; `each` sees the environment before every action.
+/// Ends at success or at the horizon.
 ///
 /// # Errors
 /// Never in practice: the demonstrator's actions are finite.

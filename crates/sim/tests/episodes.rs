@@ -1,4 +1,5 @@
-//! Whole episodes: seeds, replay to the bit, the demonstrator, spoiled objects, a twin with names and zeros of its own.
+//! Whole episodes: seeds, replay to the bit, the demonstrator, spoiled objects, a twin with names
+//! and zeros of its own.
 
 use hingecast_sim::trial::{demonstrate, make_task};
 use hingecast_sim::{Env, Expert, Outcome, Scene, SceneConfig, Spoil, SpotPath, TaskKind};
@@ -84,7 +85,8 @@ fn observations_have_robomimics_names_and_sizes_and_the_box_stands_where_it_shou
     }
 }
 
-/// The same box under other names, its joint's zero half open and its axis turned around, as a twin may have it.
+/// The same box under other names, its joint's zero half open and its axis turned around, as a twin
+/// may have it.
 fn a_twin(dir: &Path, hinge: f64) -> PathBuf {
     let half: f64 = 0.785;
     let (c, s) = ((half / 2.0).cos(), (half / 2.0).sin());
@@ -125,7 +127,8 @@ fn a_twin_with_names_zero_and_sign_of_its_own_looks_the_same_to_a_policy() {
     assert!(done >= 9, "{done} of 10");
 }
 
-/// Whether what opens `a` opens `b`: the actions are computed in `a` alone, until that is well open.
+/// Whether what opens `a` opens `b`: the actions are computed in `a` alone, until that is well
+/// open.
 fn replayed(a: &mut Env, b: &mut Env, seed: u64) -> bool {
     a.reset(seed);
     b.reset(seed);
@@ -175,7 +178,8 @@ fn bad_input_is_named_in_three_lines() {
     three(env.set_state(&[0.0; 3]).unwrap_err(), "3");
 }
 
-/// A demonstrator that knows the joint in front of it opens many a wrong one; where the part then is tells them apart.
+/// A demonstrator that knows the joint in front of it opens many a wrong one; where the part then
+/// is tells them apart.
 #[test]
 fn a_wrong_joint_opens_and_yet_not_as_the_true_one() {
     let truth = scene(&covered_box(), &covered_box(), &[]);
@@ -211,7 +215,8 @@ fn the_tolerance_is_half_a_pad() {
     assert_eq!(scene.model.geom_size()[pad][0], hingecast_sim::path::TOLERANCE);
 }
 
-/// Whatever the file's zero and unit of angles are: a wrong hinge moves the part otherwise, but closed it stands where it stood.
+/// Whatever the file's zero and unit of angles are: a wrong hinge moves the part otherwise, but
+/// closed it stands where it stood.
 #[test]
 fn a_spoiled_joint_leaves_the_closed_part_where_it_was() {
     let dir = tempfile::tempdir().unwrap();

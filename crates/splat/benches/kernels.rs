@@ -1,7 +1,8 @@
 //! One view of 20 000 gaussians at 256 x 256: forward, loss, backward, a whole step of training.
 //!
-//! `cargo bench -p hingecast-splat`. The scene is that of `examples/engine_speed.rs`, which compares
-//! with the scalar twin. Projection, sorting and rasterising are one pass behind `Engine::render`.
+//! `cargo bench -p hingecast-splat`. The scene is that of `examples/engine_speed.rs`, which
+//! compares with the scalar twin. Projection, sorting and rasterising are one pass behind
+//! `Engine::render`.
 
 use divan::{Bencher, black_box};
 use glam::{DVec3, Quat, Vec3};

@@ -1,9 +1,10 @@
-//! Milliseconds per pass at 20 000 gaussians and 256 x 256, the engine against its per-pixel scalar twin, in one run.
+//! Milliseconds per pass at 20 000 gaussians and 256 x 256, the engine against its per-pixel scalar
+//! twin, in one run.
 //!
-//! `cargo run --release -p hingecast-splat --example engine_speed [-- threads]`
-//! A bumpy sphere of flattened gaussians, colour + depth + alpha loss with SSIM, fourteen parameters each.
-//! The twin computes in f64; the same loops in f32 took about two thirds of its time.
-//! The twin runs one view per thread, which is its best case: no synchronisation inside an image.
+//! `cargo run --release -p hingecast-splat --example engine_speed [-- threads]` A bumpy sphere of
+//! flattened gaussians, colour + depth + alpha loss with SSIM, fourteen parameters each. The twin
+//! computes in f64; the same loops in f32 took about two thirds of its time. The twin runs one view
+//! per thread, which is its best case: no synchronisation inside an image.
 
 use glam::{DVec3, Vec3};
 use hingecast_geom::{Camera, Gaussians};
@@ -120,7 +121,8 @@ fn main() {
     }
 }
 
-/// Forward, backward (pixels to parameters), iteration without Adam; ms per view with `threads` views at a time.
+/// Forward, backward (pixels to parameters), iteration without Adam; ms per view with `threads`
+/// views at a time.
 fn measure_reference(
     g: &Gaussians,
     cameras: &[Camera],
@@ -175,7 +177,8 @@ fn measure_engine(
     let iteration = median_ms(200, |i| {
         engine.step(&targets[i % 8], config, rates).expect("a valid target");
     });
-    // Backward alone, out of the public interface: gradients of given pixels, less what the copy of the pixels costs.
+    // Backward alone, out of the public interface: gradients of given pixels, less what the copy of
+    // the pixels costs.
     let forward = median_ms(100, |i| {
         engine.render(&cameras[i % 8], &RenderOptions::default()).expect("a valid camera");
     });

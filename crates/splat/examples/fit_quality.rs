@@ -1,8 +1,10 @@
-//! Fits a ray-traced scene and measures held-out views: textured boxes and a sphere, a thin plate, thin rods.
+//! Fits a ray-traced scene and measures held-out views: textured boxes and a sphere, a thin plate,
+//! thin rods.
 //!
-//! `cargo run --release -p hingecast-splat --example fit_quality [-- gaussians iterations threads noise]`
-//! `noise`: standard deviation of the depth in 1/1000 of the depth; with it colours are rounded to 8 bit.
-//! Colour is supersampled 4 x 4 over a white background; mask and depth are those of the pixel centre.
+//! `cargo run --release -p hingecast-splat --example fit_quality [-- gaussians iterations threads
+//! noise]` `noise`: standard deviation of the depth in 1/1000 of the depth; with it colours are
+//! rounded to 8 bit. Colour is supersampled 4 x 4 over a white background; mask and depth are those
+//! of the pixel centre.
 
 use glam::{DQuat, DVec2, DVec3};
 use hingecast_geom::{Camera, Progress};

@@ -1,4 +1,5 @@
-//! Adam (Kingma & Ba 2015), sparse: a gaussian without any gradient in this step keeps its parameters and moments.
+//! Adam (Kingma & Ba 2015), sparse: a gaussian without any gradient in this step keeps its
+//! parameters and moments.
 
 use crate::params::plane;
 use crate::project::{CHUNK, PlaneTable};
@@ -7,7 +8,8 @@ use serde::{Deserialize, Serialize};
 
 const BETA_1: f32 = 0.9;
 const BETA_2: f32 = 0.999;
-/// Squared epsilon: gradients of a mean over pixels are tiny, so epsilon must be far below them (1e-15).
+/// Squared epsilon: gradients of a mean over pixels are tiny, so epsilon must be far below them
+/// (1e-15).
 const EPS_SQUARED: f32 = 1e-30;
 
 /// Learning rates: the largest change of a parameter per step.

@@ -1,5 +1,5 @@
-//! Depth sort and binning: for every 16 x 16 tile the gaussians that touch it, nearest first, each with one bit per 4 x 4
-//! (or 4 x 2) pixel block that its alpha >= 1/255 ellipse reaches.
+//! Depth sort and binning: for every 16 x 16 tile the gaussians that touch it, nearest first, each
+//! with one bit per 4 x 4 (or 4 x 2) pixel block that its alpha >= 1/255 ellipse reaches.
 
 use crate::error::SplatError;
 use crate::pool::Shards;
@@ -17,7 +17,8 @@ pub(crate) struct Entry {
     pub id: u32,
     /// One bit per block of the tile.
     pub mask: u32,
-    /// Where the backward pass puts this pair's gradient, so that the sum over tiles has a fixed order.
+    /// Where the backward pass puts this pair's gradient, so that the sum over tiles has a fixed
+    /// order.
     pub slot: u32,
 }
 
@@ -143,10 +144,12 @@ pub(crate) unsafe fn bin<T: Lanes>(args: &Args, strip: usize) {
     }
 }
 
-/// One bit per block: does the ellipse alpha >= 1/255 meet the rectangle spanned by the block's pixel centres?
+/// One bit per block: does the ellipse alpha >= 1/255 meet the rectangle spanned by the block's
+/// pixel centres?
 ///
-/// The exponent is a concave quadratic, so over a rectangle that does not hold the centre its maximum lies on an edge
-/// facing the centre: try the nearest x with the best y on that edge, and the nearest y with the best x.
+/// The exponent is a concave quadratic, so over a rectangle that does not hold the centre its
+/// maximum lies on an edge facing the centre: try the nearest x with the best y on that edge, and
+/// the nearest y with the best x.
 #[inline(always)]
 fn block_mask<T: Lanes>(q: &Splat, tile_x: f32, tile_y: f32) -> u32 {
     const fn offsets(rows: usize, vertical: bool) -> [f32; 32] {

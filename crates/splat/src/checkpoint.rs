@@ -1,8 +1,8 @@
 //! Saving and resuming a fit: parameters, Adam state and iteration in one safetensors file.
 //!
-//! Tensors `params`, `first`, `second`: f32 (planes, gaussians), see [`crate::plane`]. Metadata: `steps` (Adam's counter),
-//! `iteration` and `extent` of the fit. Written to a temporary name and renamed, so a file is whole or absent.
-//! Groups and poses are not part of it.
+//! Tensors `params`, `first`, `second`: f32 (planes, gaussians), see [`crate::plane`]. Metadata:
+//! `steps` (Adam's counter), `iteration` and `extent` of the fit. Written to a temporary name and
+//! renamed, so a file is whole or absent. Groups and poses are not part of it.
 
 use crate::engine::Engine;
 use crate::error::SplatError;
@@ -65,7 +65,8 @@ pub fn save(engine: &Engine, checkpoint: &Checkpoint, path: &Path) -> Result<(),
 /// Restores parameters and Adam state into an engine of the same size.
 ///
 /// # Errors
-/// No such file, not a checkpoint, or one of another number of gaussians or harmonics; the engine is then unchanged.
+/// No such file, not a checkpoint, or one of another number of gaussians or harmonics; the engine
+/// is then unchanged.
 pub fn load(engine: &mut Engine, path: &Path) -> Result<Checkpoint, SplatError> {
     let data = std::fs::read(path).map_err(|source| SplatError::Io { path: path.to_path_buf(), source })?;
     let length = data.get(..8).map(|b| u64::from_le_bytes(b.try_into().expect("eight bytes")) as usize);

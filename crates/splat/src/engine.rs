@@ -19,7 +19,8 @@ use hingecast_geom::{Camera, Gaussians, Pose};
 pub struct RenderOptions<'a> {
     /// Colour behind the gaussians, rgb, 0..1.
     pub background: [f32; 3],
-    /// Values blended like colours (labels, one-hot parts, normals): (gaussians, channels), gaussian-major.
+    /// Values blended like colours (labels, one-hot parts, normals): (gaussians, channels),
+    /// gaussian-major.
     pub extra: &'a [f32],
     /// 0..=32
     pub channels: usize,
@@ -65,12 +66,15 @@ pub struct PixelGradients {
 /// Gradients of a scalar by everything that the engine can move.
 #[derive(Clone, Debug, Default)]
 pub struct Gradients {
-    /// By the (canonical) parameters, in parameter layout. Add regularisers here before [`Engine::adam_step`].
+    /// By the (canonical) parameters, in parameter layout. Add regularisers here before
+    /// [`Engine::adam_step`].
     pub params: Planes,
-    /// By each group's pose: world_from_group <- exp(xi) * world_from_group, xi = (vx vy vz wx wy wz), translation first,
-    /// world frame, rotation about the world origin. Length 1 (moving everything) without groups.
+    /// By each group's pose: world_from_group <- exp(xi) * world_from_group, xi = (vx vy vz wx wy
+    /// wz), translation first, world frame, rotation about the world origin. Length 1 (moving
+    /// everything) without groups.
     pub poses: Vec<[f64; 6]>,
-    /// The same twist applied to the whole world: camera_from_world <- camera_from_world * exp(xi). Sum of `poses`.
+    /// The same twist applied to the whole world: camera_from_world <- camera_from_world * exp(xi).
+    /// Sum of `poses`.
     pub camera: [f64; 6],
     /// By the extra values of the last render. (gaussians, channels)
     pub extra: Vec<f32>,
@@ -102,7 +106,8 @@ impl Engine {
         Self::with_simd(gaussians, threads, Simd::best())
     }
 
-    /// As [`Engine::from_gaussians`] with a chosen instruction set; one that the CPU lacks falls back to plain code.
+    /// As [`Engine::from_gaussians`] with a chosen instruction set; one that the CPU lacks falls
+    /// back to plain code.
     ///
     /// # Errors
     /// As [`Engine::from_gaussians`].
@@ -173,8 +178,9 @@ impl Engine {
         self.steps = 0;
     }
 
-    /// From now on gaussian i is drawn at `world_from_group[groups[i]]` times its canonical pose. View-dependent colour turns
-    /// with the group. Empty slices: one group at rest. Sorting gaussians by group is faster.
+    /// From now on gaussian i is drawn at `world_from_group[groups[i]]` times its canonical pose.
+    /// View-dependent colour turns with the group. Empty slices: one group at rest. Sorting
+    /// gaussians by group is faster.
     ///
     /// # Errors
     /// Not one group per gaussian, a group without pose, a pose that is not finite.
@@ -252,7 +258,8 @@ impl Engine {
         })
     }
 
-    /// The gaussian that each pixel of the last render shows: where half of the light is gone. (h, w)
+    /// The gaussian that each pixel of the last render shows: where half of the light is gone. (h,
+    /// w)
     ///
     /// # Errors
     /// Nothing was rendered since the parameters changed.
@@ -292,7 +299,8 @@ impl Engine {
         Ok(self.buffers.loss(&mut self.pool, self.kernels, target, config))
     }
 
-    /// Loss, and its gradients by parameters, group poses and camera pose. `gradients` is overwritten.
+    /// Loss, and its gradients by parameters, group poses and camera pose. `gradients` is
+    /// overwritten.
     ///
     /// # Errors
     /// As [`Engine::loss`].
@@ -307,9 +315,9 @@ impl Engine {
         Ok(terms)
     }
 
-    /// As [`Engine::loss_and_gradients`], with extra channels and a loss on them: `extra_loss(rendered, gradient)` gets both
-    /// as (channels, h, w) premultiplied planes, fills the gradient (zeros before) and returns its loss, which is added to
-    /// `total`.
+    /// As [`Engine::loss_and_gradients`], with extra channels and a loss on them:
+    /// `extra_loss(rendered, gradient)` gets both as (channels, h, w) premultiplied planes, fills
+    /// the gradient (zeros before) and returns its loss, which is added to `total`.
     ///
     /// # Errors
     /// As [`Engine::render`].
@@ -331,7 +339,8 @@ impl Engine {
         Ok(terms)
     }
 
-    /// Gradients of any scalar of the last render, given its gradient by the pixels. `gradients` is overwritten.
+    /// Gradients of any scalar of the last render, given its gradient by the pixels. `gradients` is
+    /// overwritten.
     ///
     /// # Errors
     /// Nothing was rendered since the parameters changed; wrong lengths.
@@ -357,7 +366,8 @@ impl Engine {
         Ok(())
     }
 
-    /// Copies planes of the picture's size (`interleave` 1) or interleaved pixels into the padded gradient planes.
+    /// Copies planes of the picture's size (`interleave` 1) or interleaved pixels into the padded
+    /// gradient planes.
     fn set_gradient_planes(&mut self, first: usize, count: usize, values: &[f32], interleave: usize) {
         let view = &self.buffers.view;
         let (w, h, stride, len) = (view.width, view.height, view.stride(), view.plane_len());
@@ -406,7 +416,8 @@ impl Engine {
         }
     }
 
-    /// One Adam step on gradients that other code may have added to. Gaussians whose gradients are all zero keep still.
+    /// One Adam step on gradients that other code may have added to. Gaussians whose gradients are
+    /// all zero keep still.
     ///
     /// # Errors
     /// Gradients of another set, or not finite.
@@ -428,8 +439,8 @@ impl Engine {
         Ok(())
     }
 
-    /// Loss, gradients and Adam in one go, without storing gradients: the same result as [`Engine::loss_and_gradients`]
-    /// then [`Engine::adam_step`], faster.
+    /// Loss, gradients and Adam in one go, without storing gradients: the same result as
+    /// [`Engine::loss_and_gradients`] then [`Engine::adam_step`], faster.
     ///
     /// # Errors
     /// As [`Engine::loss`].

@@ -1,8 +1,8 @@
 //! Fits gaussians to views: many [`Engine::step`]s in a good order.
 //!
-//! Half-size pictures for the first third; learning rates that fall exponentially; dead gaussians moved to where the error
-//! is. The order of views and everything random follow from the seed and the iteration, so that a resumed fit takes the
-//! same steps as one that was never stopped.
+//! Half-size pictures for the first third; learning rates that fall exponentially; dead gaussians
+//! moved to where the error is. The order of views and everything random follow from the seed and
+//! the iteration, so that a resumed fit takes the same steps as one that was never stopped.
 
 use crate::adam::Rates;
 use crate::checkpoint::{self, Checkpoint};
@@ -34,7 +34,8 @@ pub struct FitConfig {
     pub final_means: f32,
     /// The same for all other rates.
     pub final_others: f32,
-    /// Iterations between two relocations of dead gaussians; 0 never. None happen in the last quarter.
+    /// Iterations between two relocations of dead gaussians; 0 never. None happen in the last
+    /// quarter.
     pub relocate_every: usize,
     /// Where to save, if at all, and how often. An existing file is resumed from.
     pub checkpoint: Option<PathBuf>,
@@ -75,8 +76,8 @@ pub struct FitReport {
 /// Fits the engine's gaussians to `views`.
 ///
 /// # Errors
-/// No views, views of impossible size, a checkpoint of another fit, or [`SplatError::Cancelled`]; then the work so far is in
-/// the checkpoint, if one was asked for.
+/// No views, views of impossible size, a checkpoint of another fit, or [`SplatError::Cancelled`];
+/// then the work so far is in the checkpoint, if one was asked for.
 pub fn fit(
     engine: &mut Engine,
     views: &Views,

@@ -1,4 +1,5 @@
-//! The passes of one image over reused buffers: project, sort, bin, draw; loss; back to pairs; back to parameters.
+//! The passes of one image over reused buffers: project, sort, bin, draw; loss; back to pairs; back
+//! to parameters.
 
 use crate::bins::{self, Entry, Order};
 use crate::error::SplatError;

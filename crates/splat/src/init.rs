@@ -1,4 +1,5 @@
-//! First gaussians: flat discs on the surface that the depth pictures show, or points in the visual hull without depth.
+//! First gaussians: flat discs on the surface that the depth pictures show, or points in the visual
+//! hull without depth.
 
 use crate::error::SplatError;
 use crate::target::Target;
@@ -25,8 +26,8 @@ pub struct SurfaceSample {
     pub group: u16,
 }
 
-/// About `n` gaussians, evenly spread over the surface: standard deviations 0.55 of the spacing along the surface and 0.1
-/// across it, opacity 0.9, colour the mean of what the views saw.
+/// About `n` gaussians, evenly spread over the surface: standard deviations 0.55 of the spacing
+/// along the surface and 0.1 across it, opacity 0.9, colour the mean of what the views saw.
 ///
 /// # Errors
 /// No views, or nothing to start from: neither depth nor masks that agree on a volume.
@@ -42,7 +43,8 @@ pub fn initialise(views: &Views, n: usize, seed: u64) -> Result<Gaussians, Splat
     if samples.is_empty() { from_hull(views, n, seed) } else { Ok(from_surface(&samples, n).0) }
 }
 
-/// Every pixel of one of `count` views with depth, or every k-th when there are too many; group 0, world frame.
+/// Every pixel of one of `count` views with depth, or every k-th when there are too many; group 0,
+/// world frame.
 pub fn surface_samples(target: &Target, count: usize, seed: u64) -> Vec<SurfaceSample> {
     let mut rng = fastrand::Rng::with_seed(seed);
     let mut out = Vec::new();
@@ -75,8 +77,8 @@ fn point(target: &Target, depth: &[f32], x: usize, y: usize) -> DVec3 {
     target.camera.unproject(DVec2::new(x as f64 + 0.5, y as f64 + 0.5), z)
 }
 
-/// World normal towards the camera from the depth of the neighbours; None beside a depth edge, where the pixel may be a
-/// mixture, unless it is seen on no other side.
+/// World normal towards the camera from the depth of the neighbours; None beside a depth edge,
+/// where the pixel may be a mixture, unless it is seen on no other side.
 fn normal(target: &Target, depth: &[f32], x: usize, y: usize) -> Option<Vec3> {
     let (w, h) = (target.camera.width, target.camera.height);
     let own = f64::from(depth[y * w + x]);
@@ -107,8 +109,8 @@ fn normal(target: &Target, depth: &[f32], x: usize, y: usize) -> Option<Vec3> {
     Some((if n.dot(towards) < 0.0 { -n } else { n }).as_vec3())
 }
 
-/// One gaussian per group, occupied voxel and side; the voxel size is searched for about `n`. Answers the gaussians and
-/// their groups.
+/// One gaussian per group, occupied voxel and side; the voxel size is searched for about `n`.
+/// Answers the gaussians and their groups.
 pub fn from_surface(samples: &[SurfaceSample], n: usize) -> (Gaussians, Vec<u16>) {
     let (mut lo, mut hi) = (Vec3::INFINITY, Vec3::NEG_INFINITY);
     for s in samples {
@@ -144,7 +146,8 @@ fn logit(p: f32) -> f32 {
     (p / (1.0 - p)).ln()
 }
 
-/// Means per voxel; samples that face away from the voxel's first one are a second surface (the back of a thin sheet).
+/// Means per voxel; samples that face away from the voxel's first one are a second surface (the
+/// back of a thin sheet).
 fn merge(samples: &[SurfaceSample], origin: Vec3, voxel: f32) -> Vec<SurfaceSample> {
     let mut keyed: Vec<((u16, u64), u32)> = samples
         .iter()
@@ -185,7 +188,8 @@ fn from_hull(views: &Views, n: usize, seed: u64) -> Result<Gaussians, SplatError
     let mut rng = fastrand::Rng::with_seed(seed);
     let targets: Vec<_> = (0..views.count).map(|i| (views.get)(i)).collect();
     let masks: Vec<Vec<f32>> = targets.iter().map(|t| t.depth_and_mask().1).collect();
-    // The point nearest to all viewing axes, and the largest ball around it that some view sees whole.
+    // The point nearest to all viewing axes, and the largest ball around it that some view sees
+    // whole.
     let (mut a, mut b) = (glam::DMat3::ZERO, DVec3::ZERO);
     for t in &targets {
         let axis = t.camera.ray(DVec2::new(0.5 * t.camera.width as f64, 0.5 * t.camera.height as f64)).normalize();

@@ -4,10 +4,10 @@
 //! - [`Target`] is one training view, prepared once.
 //! - [`Engine::set_groups`] moves groups of gaussians rigidly and hands back the gradient by each group's pose.
 //!
-//! Conventions are those of `hingecast-geom`: OpenCV cameras, pixel centres at +0.5, depth is z, `a_from_b`.
-//! Alpha below 1/255 does not count, alpha is capped at 0.99, a pixel is finished below a transmittance of 1e-4, and 0.3 px
-//! are added to both screen variances. Results do not depend on the number of threads, bit for bit; between instruction
-//! sets they agree to about 1e-5.
+//! Conventions are those of `hingecast-geom`: OpenCV cameras, pixel centres at +0.5, depth is z,
+//! `a_from_b`. Alpha below 1/255 does not count, alpha is capped at 0.99, a pixel is finished below
+//! a transmittance of 1e-4, and 0.3 px are added to both screen variances. Results do not depend on
+//! the number of threads, bit for bit; between instruction sets they agree to about 1e-5.
 //!
 //! ```
 //! use glam::{DVec2, DVec3};

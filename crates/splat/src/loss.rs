@@ -6,9 +6,9 @@
 //! depth  = mean over all pixels of w rho(|D - z A|), counted where z is known; rho(e) = ln(1 + e/s) or e/s
 //! alpha  = mean over all pixels of w max(|A - a| - s, 0); the slack s is 0, on the mask's edge 1/2
 //!
-//! D - z A = sum of w_i (z_i - z): zero exactly when the normalised depth D / A is right, whatever the opacity, so depth is
-//! not biased towards the camera or away from it where the object is still half transparent.
-//! SSIM is that of the crop around the object; outside of it counts as 1.
+//! D - z A = sum of w_i (z_i - z): zero exactly when the normalised depth D / A is right, whatever
+//! the opacity, so depth is not biased towards the camera or away from it where the object is still
+//! half transparent. SSIM is that of the crop around the object; outside of it counts as 1.
 
 use crate::pool::Shards;
 use crate::raster::PLANES;
@@ -126,8 +126,8 @@ pub(crate) unsafe fn ssim_band<T: Lanes>(args: &SsimArgs, item: usize) {
     }
 }
 
-/// Crop rows `band * BAND ..`: x' of one channel into the padded scratch plane, whose margins beyond the crop are cleared
-/// (an earlier view may have had a larger crop).
+/// Crop rows `band * BAND ..`: x' of one channel into the padded scratch plane, whose margins
+/// beyond the crop are cleared (an earlier view may have had a larger crop).
 pub(crate) fn blend_band(
     view: &View,
     target: &Target,

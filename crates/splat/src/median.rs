@@ -1,8 +1,9 @@
 //! The surface that a pixel shows: the gaussian at which half of the light is gone.
 //!
-//! The mean depth sum(w z) / alpha lies between front and back at every depth edge; the median does not mix
-//! (as in 2D Gaussian Splatting, Huang et al. 2024), but jumps from centre to centre of the gaussians. So the depth
-//! here is the mean over the gaussians near the median. Scalar code: it runs once per picture, not once per step.
+//! The mean depth sum(w z) / alpha lies between front and back at every depth edge; the median does
+//! not mix (as in 2D Gaussian Splatting, Huang et al. 2024), but jumps from centre to centre of the
+//! gaussians. So the depth here is the mean over the gaussians near the median. Scalar code: it
+//! runs once per picture, not once per step.
 
 use crate::bins::Entry;
 use crate::pool::{Pool, Shards};

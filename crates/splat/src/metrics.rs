@@ -2,7 +2,8 @@
 
 use crate::ssim::{C1, C2, Padded, WINDOW, moments};
 
-/// Peak signal to noise ratio in dB of values in 0..=1; capped at 120 for equal pictures, NaN for none.
+/// Peak signal to noise ratio in dB of values in 0..=1; capped at 120 for equal pictures, NaN for
+/// none.
 ///
 /// # Panics
 /// When the pictures have different sizes.
@@ -12,7 +13,8 @@ pub fn psnr(a: &[f32], b: &[f32]) -> f64 {
     -10.0 * (sum / a.len() as f64).max(1e-12).log10()
 }
 
-/// Mean structural similarity of two (h, w, 3) pictures: 11 x 11 window, sigma 1.5, zero outside, as in training.
+/// Mean structural similarity of two (h, w, 3) pictures: 11 x 11 window, sigma 1.5, zero outside,
+/// as in training.
 ///
 /// # Panics
 /// When a picture is not (height, width, 3).
@@ -48,7 +50,8 @@ pub fn ssim(a: &[f32], b: &[f32], width: usize, height: usize) -> f64 {
     total / (3 * width * height) as f64
 }
 
-/// Mean absolute difference over pixels where both depths are known (above 0); None when there are none.
+/// Mean absolute difference over pixels where both depths are known (above 0); None when there are
+/// none.
 pub fn depth_mae(a: &[f32], b: &[f32]) -> Option<f64> {
     assert_eq!(a.len(), b.len(), "pictures of one size");
     let (mut sum, mut count) = (0.0, 0);

@@ -1,4 +1,5 @@
-//! Parameters of all gaussians as planes (structure of arrays), the layout that the kernels and Adam work on.
+//! Parameters of all gaussians as planes (structure of arrays), the layout that the kernels and
+//! Adam work on.
 
 use crate::error::{SplatError, check_finite, check_len};
 use hingecast_geom::Gaussians;
@@ -26,7 +27,8 @@ pub mod plane {
 /// Gaussians are handled in vectors of up to 16; every plane is padded to a multiple of this.
 pub(crate) const PAD: usize = 16;
 
-/// 14 (degree 0) or 23 (degree 1) planes of `len` floats, see [`plane`]. Also holds gradients and Adam moments.
+/// 14 (degree 0) or 23 (degree 1) planes of `len` floats, see [`plane`]. Also holds gradients and
+/// Adam moments.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Planes {
     len: usize,
@@ -121,7 +123,8 @@ impl Planes {
                 }
             }
         }
-        // Padding gaussians: a valid rotation so that no NaN is computed, and too transparent to be drawn.
+        // Padding gaussians: a valid rotation so that no NaN is computed, and too transparent to be
+        // drawn.
         for i in n..n.next_multiple_of(PAD) {
             out.planes[plane::QUATS][i] = 1.0;
             out.planes[plane::OPACITY][i] = -20.0;

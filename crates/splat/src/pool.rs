@@ -1,15 +1,16 @@
 //! A fork-join pool whose workers spin between the short parallel regions of one step.
 //!
-//! A step is about ten regions of a fraction of a millisecond; waking a sleeping thread for each costs 8-10 % of the step.
-//! A worker that hears nothing for about a millisecond goes to sleep, so an idle engine costs nothing.
+//! A step is about ten regions of a fraction of a millisecond; waking a sleeping thread for each
+//! costs 8-10 % of the step. A worker that hears nothing for about a millisecond goes to sleep, so
+//! an idle engine costs nothing.
 
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 use std::thread::JoinHandle;
 
-/// Spins, about 10 us, before a waiting thread offers its core: when other programs want the cores too, the thread that we
-/// wait for may be waiting for ours.
+/// Spins, about 10 us, before a waiting thread offers its core: when other programs want the cores
+/// too, the thread that we wait for may be waiting for ours.
 const SPINS_BEFORE_YIELD: u32 = 400;
 /// Spins and yields before a worker parks; about 1 ms on an idle machine.
 const TRIES_BEFORE_PARK: u32 = 4_000;
@@ -68,7 +69,8 @@ impl Pool {
         self.workers.len() + 1
     }
 
-    /// Calls `f(i)` once for every i in 0..items, on any thread, in any order. What `f` computes must not depend on either.
+    /// Calls `f(i)` once for every i in 0..items, on any thread, in any order. What `f` computes
+    /// must not depend on either.
     pub fn run(&mut self, items: usize, f: impl Fn(usize) + Sync) {
         if self.workers.is_empty() || items < 2 {
             (0..items).for_each(f);
@@ -76,7 +78,8 @@ impl Pool {
         }
         let s = &*self.shared;
         let job: &(dyn Fn(usize) + Sync) = &f;
-        // Sound because this function does not return, or unwind, before every worker has left the region.
+        // Sound because this function does not return, or unwind, before every worker has left the
+        // region.
         let words: [usize; 2] = unsafe { std::mem::transmute(job) };
         s.job[0].store(words[0], Ordering::Relaxed);
         s.job[1].store(words[1], Ordering::Relaxed);
@@ -121,8 +124,9 @@ fn work(s: &Shared, index: usize) {
                 wait_a_little(&mut tries);
                 continue;
             }
-            // The caller reads `parked` after it changed `region`, we read `region` after we set `parked`: one of the two
-            // sees the other (both sequentially consistent), so no wake-up is lost.
+            // The caller reads `parked` after it changed `region`, we read `region` after we set
+            // `parked`: one of the two sees the other (both sequentially consistent), so no wake-up
+            // is lost.
             s.parked[index].store(true, Ordering::SeqCst);
             if s.region.load(Ordering::SeqCst) == seen {
                 std::thread::park();

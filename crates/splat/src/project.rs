@@ -1,19 +1,23 @@
-//! Projection of 16 (or 8) gaussians a vector: canonical parameters -> one 64-byte screen record each.
+//! Projection of 16 (or 8) gaussians a vector: canonical parameters -> one 64-byte screen record
+//! each.
 //!
-//! EWA splatting (Zwicker et al. 2001) as in 3D Gaussian Splatting (Kerbl et al. 2023): with M = camera_from_group,
-//! x = M m, covariance S2 = J R Q S S Q' R' J' + 0.3 px, J the Jacobian of the pinhole projection at x.
-//! The product J R Q S is kept as 2 x 3 factors: T = U Q S with U = J R, so that S2 = T T' + 0.3.
+//! EWA splatting (Zwicker et al. 2001) as in 3D Gaussian Splatting (Kerbl et al. 2023): with M =
+//! camera_from_group, x = M m, covariance S2 = J R Q S S Q' R' J' + 0.3 px, J the Jacobian of the
+//! pinhole projection at x. The product J R Q S is kept as 2 x 3 factors: T = U Q S with U = J R,
+//! so that S2 = T T' + 0.3.
 
 use crate::params::{Planes, plane};
 use crate::pool::Shards;
 use crate::simd::Lanes;
 use crate::view::View;
 
-/// Gaussians per work item; a multiple of 16. Fixed, because partial sums per chunk must not depend on the thread count.
+/// Gaussians per work item; a multiple of 16. Fixed, because partial sums per chunk must not depend
+/// on the thread count.
 pub(crate) const CHUNK: usize = 1024;
 /// Nearer than this (scene units) is not drawn.
 pub(crate) const NEAR: f32 = 0.01;
-/// Added to both variances on screen, px^2: a gaussian is never thinner than the pixel grid can show.
+/// Added to both variances on screen, px^2: a gaussian is never thinner than the pixel grid can
+/// show.
 pub(crate) const DILATION: f32 = 0.3;
 /// log2(1/255): fainter than this does not count.
 pub(crate) const MIN_LOG2_ALPHA: f32 = -7.994_353_4;
@@ -248,7 +252,8 @@ pub(crate) fn view_direction<T: Lanes>(mean: &[T; 3], f: &FrameLanes<T>) -> ([T;
     ([d[0] * recip, d[1] * recip, d[2] * recip], recip)
 }
 
-/// Colour before the clamp at 0: 0.5 + C0 f0 + C1 (-y f1 + z f2 - x f3), the basis and signs of the INRIA code.
+/// Colour before the clamp at 0: 0.5 + C0 f0 + C1 (-y f1 + z f2 - x f3), the basis and signs of the
+/// INRIA code.
 ///
 /// # Safety
 /// As [`project_vector`].
@@ -323,8 +328,8 @@ pub(crate) unsafe fn project<T: Lanes>(args: &Args, chunk: usize) {
         }
         for lane in 0..T::N {
             let (mx, my, z, hx, hy) = (rows[0][lane], rows[1][lane], rows[9][lane], rows[12][lane], rows[13][lane]);
-            // Positive-phrased, so that NaN reliably fails. Centres more than half a frame outside are not drawn: the
-            // linearised projection is meaningless there.
+            // Positive-phrased, so that NaN reliably fails. Centres more than half a frame outside
+            // are not drawn: the linearised projection is meaningless there.
             let near_frame = mx > -0.5 * w && mx < 1.5 * w && my > -0.5 * h && my < 1.5 * h;
             let touches = mx + hx > 0.0 && mx - hx < w && my + hy > 0.0 && my - hy < h;
             let visible = z > NEAR && hx > 0.0 && hy > 0.0 && near_frame && touches;

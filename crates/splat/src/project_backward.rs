@@ -1,8 +1,10 @@
-//! From the ten sums per (gaussian, tile) pair to gradients of every parameter, and Adam in the same pass.
+//! From the ten sums per (gaussian, tile) pair to gradients of every parameter, and Adam in the
+//! same pass.
 //!
-//! The pixel kernel leaves, per pair, sum w g_rgb (3), sum w g_depth, and the moments S0 Sx Sy Sxx Sxy Syy of
-//! D = dL/d ln(alpha) about the centre. With ln(alpha) = ln(o) - 1/2 d' K d, d = pixel - mean, K = S2^-1:
-//! dL/d logit = (1 - o) S0, dL/d mean2d = K (Sx, Sy), dL/dK = -1/2 (Sxx Sxy; Sxy Syy), dL/dS2 = -K dL/dK K.
+//! The pixel kernel leaves, per pair, sum w g_rgb (3), sum w g_depth, and the moments S0 Sx Sy Sxx
+//! Sxy Syy of D = dL/d ln(alpha) about the centre. With ln(alpha) = ln(o) - 1/2 d' K d, d = pixel -
+//! mean, K = S2^-1: dL/d logit = (1 - o) S0, dL/d mean2d = K (Sx, Sy), dL/dK = -1/2 (Sxx Sxy; Sxy
+//! Syy), dL/dS2 = -K dL/dK K.
 
 use crate::adam::{Adam, adam_vector};
 use crate::params::plane;
@@ -31,7 +33,8 @@ pub(crate) struct Args<'a> {
 // One value per pass: the size of the variants does not matter.
 #[allow(clippy::large_enum_variant)]
 pub(crate) enum Output<'a> {
-    /// Gradients in parameter layout, per chunk and group the frame sums, and extra values (len, channels).
+    /// Gradients in parameter layout, per chunk and group the frame sums, and extra values (len,
+    /// channels).
     Gradients {
         planes: PlaneTable,
         /// (chunks, groups); empty when nobody asked for pose gradients.
@@ -87,7 +90,8 @@ pub(crate) unsafe fn backward<T: Lanes>(args: &Args, chunk: usize) {
     }
 }
 
-/// Sums the pair rows of N gaussians in tile order, transposed to `sums[k][lane]`; false when no pair was written.
+/// Sums the pair rows of N gaussians in tile order, transposed to `sums[k][lane]`; false when no
+/// pair was written.
 #[inline(always)]
 fn gather<T: Lanes>(args: &Args, i: usize, sums: &mut [[f32; 16]; 16]) -> bool {
     let mut rows = [[0f32; 16]; 16];

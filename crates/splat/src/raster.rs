@@ -1,13 +1,14 @@
 //! The two pixel kernels: alpha compositing front to back, and its gradient front to back.
 //!
-//! A tile is sixteen 4 x 4 blocks (thirty-two 4 x 2 with eight lanes), one vector each; the loop runs over gaussians and,
-//! inside, over the set bits of the gaussian's block mask. Per-pixel state lives block by block in L1.
+//! A tile is sixteen 4 x 4 blocks (thirty-two 4 x 2 with eight lanes), one vector each; the loop
+//! runs over gaussians and, inside, over the set bits of the gaussian's block mask. Per-pixel state
+//! lives block by block in L1.
 //!
 //! Forward: w_i = alpha_i T_i, T_{i+1} = T_i (1 - alpha_i); image = sum w_i c_i + T_end background.
-//! Backward needs only two scalars per pixel. With q_i = g_rgb . c_i + g_depth z_i + g_extra . e_i and
-//! b = g_rgb . background - g_alpha, let R_i = sum_{j >= i} w_j q_j + T_end b; then
-//! dL/d ln(alpha_i) = w_i q_i - alpha_i / (1 - alpha_i) R_{i+1}, and R_0 is the dot product of the gradient image with
-//! the rendered one. No sorting back to front, no stored per-pixel last index.
+//! Backward needs only two scalars per pixel. With q_i = g_rgb . c_i + g_depth z_i + g_extra . e_i
+//! and b = g_rgb . background - g_alpha, let R_i = sum_{j >= i} w_j q_j + T_end b; then dL/d
+//! ln(alpha_i) = w_i q_i - alpha_i / (1 - alpha_i) R_{i+1}, and R_0 is the dot product of the
+//! gradient image with the rendered one. No sorting back to front, no stored per-pixel last index.
 
 use crate::bins::Entry;
 use crate::pool::Shards;
@@ -21,7 +22,8 @@ use std::mem::MaybeUninit;
 pub(crate) const MIN_TRANSMITTANCE: f32 = 1e-4;
 /// No gaussian covers a pixel completely: 1 / (1 - alpha) must stay bounded.
 pub(crate) const MAX_ALPHA: f32 = 0.99;
-/// Image planes: r g b depth transmittance, then extra channels. In the gradient image plane 4 is dL/d alpha.
+/// Image planes: r g b depth transmittance, then extra channels. In the gradient image plane 4 is
+/// dL/d alpha.
 pub(crate) const PLANES: usize = 5;
 /// Most extra channels at a time.
 pub const MAX_EXTRA: usize = 32;

@@ -1,4 +1,5 @@
-//! Moves gaussians that do nothing, or have grown out of proportion, to where the picture is wrong. Their number stays fixed.
+//! Moves gaussians that do nothing, or have grown out of proportion, to where the picture is wrong.
+//! Their number stays fixed.
 
 use crate::engine::{Engine, RenderOptions};
 use crate::error::SplatError;
@@ -10,7 +11,8 @@ use std::sync::Arc;
 
 /// Opacity below which a gaussian is dead.
 const DEAD_OPACITY: f32 = 0.02;
-/// Standard deviation, as a share of the object's radius, above which a gaussian is out of proportion.
+/// Standard deviation, as a share of the object's radius, above which a gaussian is out of
+/// proportion.
 const LARGEST: f32 = 0.5;
 /// Errors smaller than this are noise of the pictures, not missing gaussians.
 const NOISE: f32 = 0.03;
@@ -23,8 +25,9 @@ struct Place {
     size: f32,
 }
 
-/// Gives every dead gaussian a new life at a pixel of `targets` chosen with a probability that grows with its error.
-/// Returns how many moved. Engines with groups are left alone: a canonical place needs to know the group.
+/// Gives every dead gaussian a new life at a pixel of `targets` chosen with a probability that
+/// grows with its error. Returns how many moved. Engines with groups are left alone: a canonical
+/// place needs to know the group.
 ///
 /// # Errors
 /// As [`Engine::render`].

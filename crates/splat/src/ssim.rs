@@ -1,10 +1,11 @@
-//! Structural similarity (Wang et al. 2004), 11 x 11 gaussian window with sigma 1.5, fused with its gradient.
+//! Structural similarity (Wang et al. 2004), 11 x 11 gaussian window with sigma 1.5, fused with its
+//! gradient.
 //!
-//! With window means m_x, m_y, variances and covariance s_x, s_y, s_xy:
-//! ssim = (2 m_x m_y + c1)(2 s_xy + c2) / ((m_x^2 + m_y^2 + c1)(s_x + s_y + c2)), c1 = 0.01^2, c2 = 0.03^2.
-//! Everything of y is cached in the target, so a step filters three quantities: x, x^2, x y. Going back, three
-//! derivative planes p1 p2 p3 (by the filtered x, x^2, x y) are filtered with the same window:
-//! d ssim / dx = G*p1 + 2 x G*p2 + y G*p3. Outside the crop both images count as 0.
+//! With window means m_x, m_y, variances and covariance s_x, s_y, s_xy: ssim = (2 m_x m_y + c1)(2
+//! s_xy + c2) / ((m_x^2 + m_y^2 + c1)(s_x + s_y + c2)), c1 = 0.01^2, c2 = 0.03^2. Everything of y
+//! is cached in the target, so a step filters three quantities: x, x^2, x y. Going back, three
+//! derivative planes p1 p2 p3 (by the filtered x, x^2, x y) are filtered with the same window: d
+//! ssim / dx = G*p1 + 2 x G*p2 + y G*p3. Outside the crop both images count as 0.
 
 use crate::pool::Shards;
 use crate::simd::Lanes;
@@ -31,7 +32,8 @@ const MARGIN: usize = 16;
 /// Rows per work item. Fixed: partial sums must not depend on the thread count.
 pub(crate) const BAND: usize = 16;
 
-/// Size of a plane with zero margins of 16 columns and 5 rows around `width` (a multiple of 16) x `height`.
+/// Size of a plane with zero margins of 16 columns and 5 rows around `width` (a multiple of 16) x
+/// `height`.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(crate) struct Padded {
     pub width: usize,
@@ -51,7 +53,8 @@ impl Padded {
     }
 }
 
-/// The target's half of the computation, for one crop and channel. Planes in [`Padded`] layout of the crop.
+/// The target's half of the computation, for one crop and channel. Planes in [`Padded`] layout of
+/// the crop.
 pub(crate) struct Fixed<'a> {
     pub y: &'a [f32],
     pub mean: &'a [f32],
@@ -59,16 +62,19 @@ pub(crate) struct Fixed<'a> {
     pub layout: Padded,
 }
 
-/// The render's planes of one channel: x and the three derivative planes, in a layout that fits the largest crop.
+/// The render's planes of one channel: x and the three derivative planes, in a layout that fits the
+/// largest crop.
 pub(crate) struct Scratch<'a> {
     pub x: &'a [f32],
     pub layout: Padded,
 }
 
-/// Rows `band * BAND ..` of one channel: fills the derivative planes, returns the sum of ssim over `width x height` pixels.
+/// Rows `band * BAND ..` of one channel: fills the derivative planes, returns the sum of ssim over
+/// `width x height` pixels.
 ///
 /// # Safety
-/// The CPU has the features of `T`; planes have the lengths of their layouts; each band and channel runs once.
+/// The CPU has the features of `T`; planes have the lengths of their layouts; each band and channel
+/// runs once.
 #[inline(always)]
 pub(crate) unsafe fn forward<T: Lanes>(
     fixed: &Fixed,
@@ -84,7 +90,8 @@ pub(crate) unsafe fn forward<T: Lanes>(
     let (two, c1, c2) = (T::splat(2.0), T::splat(C1), T::splat(C2));
     let mut total = 0.0;
     for row in band * BAND..((band + 1) * BAND).min(height) {
-        // Vertical pass: the window's eleven rows start five rows above, which is where the margin puts row - 5.
+        // Vertical pass: the window's eleven rows start five rows above, which is where the margin
+        // puts row - 5.
         for x in (0..padded_width).step_by(T::N) {
             let (mut a, mut b, mut c) = (T::splat(0.0), T::splat(0.0), T::splat(0.0));
             for k in 0..11 {
@@ -130,7 +137,8 @@ pub(crate) unsafe fn forward<T: Lanes>(
     total
 }
 
-/// Adds `-scale * d ssim / dx` of crop row `row` to `out` (padded width floats), times `weight` if given.
+/// Adds `-scale * d ssim / dx` of crop row `row` to `out` (padded width floats), times `weight` if
+/// given.
 ///
 /// # Safety
 /// As [`forward`]; all bands of the forward pass are done.

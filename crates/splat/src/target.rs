@@ -5,7 +5,8 @@ use crate::ssim::{Padded, moments};
 use crate::view::{TILE, View};
 use hingecast_geom::Camera;
 
-/// Pixels around the mask's box that belong to the crop: SSIM looks 5 px far, edges are blurred by 1-2 px.
+/// Pixels around the mask's box that belong to the crop: SSIM looks 5 px far, edges are blurred by
+/// 1-2 px.
 const CROP_MARGIN: usize = 8;
 
 /// Pixel values as they come from a file or a renderer.
@@ -63,8 +64,9 @@ pub struct TargetImages<'a> {
     pub weight: Option<Pixels<'a>>,
     /// Colour behind the object, in the render and in the target outside the mask.
     pub background: [f32; 3],
-    /// True when the picture already shows `background` around the object: then the blended pixels just outside a binary
-    /// mask are kept. False: everything outside the mask is painted over with `background`.
+    /// True when the picture already shows `background` around the object: then the blended pixels
+    /// just outside a binary mask are kept. False: everything outside the mask is painted over with
+    /// `background`.
     pub shows_background: bool,
 }
 
@@ -97,7 +99,8 @@ pub struct Target {
     pub(crate) rgb: [Vec<f32>; 3],
     pub(crate) mean: [Vec<f32>; 3],
     pub(crate) variance: [Vec<f32>; 3],
-    /// (crop height, padded crop width): depth (0 = says nothing), alpha, and how far from it alpha may be for nothing.
+    /// (crop height, padded crop width): depth (0 = says nothing), alpha, and how far from it alpha
+    /// may be for nothing.
     pub(crate) depth: Vec<f32>,
     pub(crate) alpha: Vec<f32>,
     pub(crate) alpha_slack: Vec<f32>,
@@ -260,8 +263,9 @@ fn crop_of(mask: &Pixels, w: usize, h: usize) -> Crop {
     Crop { x0, y0, width: x1 - x0, height: y1 - y0 }
 }
 
-/// A binary mask knows of an edge pixel only whether half of it is covered; how much more or less, its blended colour tells. But
-/// the colour alone is not enough: a rim of gaussians with the background's colour costs nothing and makes silhouettes fat.
+/// A binary mask knows of an edge pixel only whether half of it is covered; how much more or less,
+/// its blended colour tells. But the colour alone is not enough: a rim of gaussians with the
+/// background's colour costs nothing and makes silhouettes fat.
 const EDGE_SLACK: f32 = 0.5;
 
 /// Whether one of the eight pixels around is on the other side of the mask.

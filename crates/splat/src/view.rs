@@ -94,13 +94,15 @@ fn frame(camera_from_group: &Pose) -> Frame {
     }
 }
 
-/// Sums over the gaussians of one group: dL/dr (3 x 3, row-major), dL/dt, dL/dcentre of its [`Frame`].
+/// Sums over the gaussians of one group: dL/dr (3 x 3, row-major), dL/dt, dL/dcentre of its
+/// [`Frame`].
 pub(crate) type FrameGradient = [f64; 15];
 
-/// dL/dxi for world_from_group <- exp(xi) * world_from_group, xi = (translation, rotation), rotation about the world origin.
+/// dL/dxi for world_from_group <- exp(xi) * world_from_group, xi = (translation, rotation),
+/// rotation about the world origin.
 ///
-/// With camera_from_group = (R, t), R = R_cw R_wg, t = R_cw t_wg + t_cw:
-/// dR = R_cw [w] R_wg and dt = R_cw (v + w x t_wg); the camera centre in the group's frame is -R' t.
+/// With camera_from_group = (R, t), R = R_cw R_wg, t = R_cw t_wg + t_cw: dR = R_cw [w] R_wg and dt
+/// = R_cw (v + w x t_wg); the camera centre in the group's frame is -R' t.
 pub(crate) fn twist_gradient(sums: &FrameGradient, camera: &Camera, world_from_group: &Pose) -> [f64; 6] {
     let camera_from_group = camera.camera_from_world * *world_from_group;
     let r = camera_from_group.mat3();

@@ -13,15 +13,16 @@ pub struct Views<'a> {
     pub count: usize,
     /// View `i`, 0 <= i < `count`; called once a step, so it should be quick.
     pub get: &'a dyn Fn(usize) -> Arc<Target>,
-    /// Poses of the engine's groups in each view (see [`crate::Engine::set_groups`]); `None`: they stay as they are.
+    /// Poses of the engine's groups in each view (see [`crate::Engine::set_groups`]); `None`: they
+    /// stay as they are.
     pub poses: Option<&'a dyn Fn(usize) -> Vec<Pose>>,
 }
 
 impl Target {
     /// The same view at half the width and height (a last odd row or column is dropped).
     ///
-    /// Colour and mask are averaged over 2 x 2 pixels; depth is kept where all four pixels know it and agree within 2 %,
-    /// because the mean across an edge is on neither side.
+    /// Colour and mask are averaged over 2 x 2 pixels; depth is kept where all four pixels know it
+    /// and agree within 2 %, because the mean across an edge is on neither side.
     ///
     /// # Errors
     /// A picture of less than 2 x 2 pixels.

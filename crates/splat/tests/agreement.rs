@@ -1,4 +1,5 @@
-//! The fast engine against its slow twin, for every instruction set of this CPU, and against itself with other threads.
+//! The fast engine against its slow twin, for every instruction set of this CPU, and against itself
+//! with other threads.
 
 mod common;
 

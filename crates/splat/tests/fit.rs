@@ -68,7 +68,8 @@ fn targets(with_depth: bool) -> Vec<Arc<Target>> {
         .collect()
 }
 
-/// Mean PSNR, mean depth error and largest alpha far from the object over views that were not trained on.
+/// Mean PSNR, mean depth error and largest alpha far from the object over views that were not
+/// trained on.
 fn held_out(engine: &mut Engine) -> (f64, f64, f32) {
     let (mut psnr, mut depth_error, mut stray) = (0.0, 0.0, 0f32);
     let cameras = cameras(5, 1.3);
@@ -144,7 +145,8 @@ fn a_stopped_fit_resumes_to_the_same_bytes() {
     let mut whole = Engine::from_gaussians(&first, 2).unwrap();
     fit(&mut whole, &views, &plain, &Progress::default()).unwrap();
 
-    // Stopped at the first report after 100 iterations, by someone else with one thread, and taken up again.
+    // Stopped at the first report after 100 iterations, by someone else with one thread, and taken
+    // up again.
     let stop = Arc::new(AtomicBool::new(false));
     let flag = Arc::clone(&stop);
     let progress = Progress::new(move |done, _, _| flag.store(done >= 100, Ordering::Relaxed), stop);
@@ -171,7 +173,8 @@ fn a_group_pose_is_found_by_its_twist_gradient() {
     let mut engine = Engine::from_gaussians(&initialise(&views, 1500, 1).unwrap(), 2).unwrap();
     fit(&mut engine, &views, &FitConfig { iterations: 300, ..FitConfig::default() }, &Progress::default()).unwrap();
 
-    // Everything is one group that starts 5 cm off; plain gradient descent of decreasing length brings it back.
+    // Everything is one group that starts 5 cm off; plain gradient descent of decreasing length
+    // brings it back.
     let wrong = DVec3::new(0.05, -0.03, 0.02);
     let mut at = wrong;
     let groups = vec![0u16; engine.len()];

@@ -1,8 +1,8 @@
 //! Every analytic gradient against central differences of the f64 reference.
 //!
-//! A gaussian's edge (alpha = 1/255) and the depth order are steps of the pipeline: a difference that happens to cross one
-//! is wrong. Steps are small (the reference is f64) and of several sizes, and one of them has to agree: a wrong gradient
-//! agrees with none.
+//! A gaussian's edge (alpha = 1/255) and the depth order are steps of the pipeline: a difference
+//! that happens to cross one is wrong. Steps are small (the reference is f64) and of several sizes,
+//! and one of them has to agree: a wrong gradient agrees with none.
 
 mod common;
 
@@ -20,7 +20,8 @@ fn close(analytic: f64, difference: f64, largest: f64) -> bool {
     (analytic - difference).abs() <= 0.01 * difference.abs().max(0.02 * largest)
 }
 
-/// Checks one parameter array: `set(g, i, k, value)` writes and `get` reads component k of gaussian i.
+/// Checks one parameter array: `set(g, i, k, value)` writes and `get` reads component k of gaussian
+/// i.
 fn check_parameter(
     name: &str,
     g: &Gaussians,

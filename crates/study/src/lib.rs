@@ -1,5 +1,6 @@
-//! What a twin is worth: demonstrations on it, policies cloned from them, rollouts on the true object and on its twins, whole experiments,
-//! and grids of recordings through the search for parts. Algorithms behind the verbs `demos`, `train`, `rollout`, `experiment` and `bench`.
+//! What a twin is worth: demonstrations on it, policies cloned from them, rollouts on the true
+//! object and on its twins, whole experiments, and grids of recordings through the search for
+//! parts. Algorithms behind the verbs `demos`, `train`, `rollout`, `experiment` and `bench`.
 
 #[cfg(feature = "mujoco")]
 pub mod experiment;

@@ -23,7 +23,8 @@ pub fn name_of(argument: &str) -> String {
     own.map_or_else(|| "object".to_string(), |n| n.to_string_lossy().into_owned())
 }
 
-/// Objects of the suites, each suite sorted. What is not there, or would share a folder with another, is noticed now and not after an hour.
+/// Objects of the suites, each suite sorted. What is not there, or would share a folder with
+/// another, is noticed now and not after an hour.
 pub fn objects(suite: &[String]) -> Result<Vec<Named>> {
     let mut objects: Vec<Named> = Vec::new();
     for argument in arguments(suite)? {
@@ -80,7 +81,8 @@ fn listed(folder: &Path) -> Vec<String> {
 /// Records an object, by a name or a path.
 ///
 /// # Errors
-/// An object that cannot be loaded, an output folder that holds something else, disk trouble, the wish to stop.
+/// An object that cannot be loaded, an output folder that holds something else, disk trouble, the
+/// wish to stop.
 pub fn record(host: &Host, object: &str, config: &SynthConfig, out: &Path) -> Result<SynthReport> {
     let object = ArticulatedObject::load(&ArticulatedObject::resolve(object)?)?;
     Ok(synth(&object, config, out, &host.watcher.stage("record"))?)
@@ -102,8 +104,8 @@ pub fn record_once(host: &Host, argument: &str, config: &SynthConfig, recording:
     write_json(&note, &settings)
 }
 
-/// Deletes what [`record_once`] recorded. A folder without its note, or one that holds anything else, stays: a recording may have been
-/// refused just because of what lies there.
+/// Deletes what [`record_once`] recorded. A folder without its note, or one that holds anything
+/// else, stays: a recording may have been refused just because of what lies there.
 pub fn tidy(host: &Host, recording: &Path) {
     let note = note_of(recording);
     if !note.is_file() || !recording.is_dir() {

@@ -10,7 +10,8 @@ use hingecast_geom::{Cancelled, KinematicTree, Pose, Progress, TriMesh};
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
-/// How fine, how heavy. Lengths are shares of the object's diagonal so that glasses and fridges get the same care.
+/// How fine, how heavy. Lengths are shares of the object's diagonal so that glasses and fridges get
+/// the same care.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct Config {
@@ -24,13 +25,15 @@ pub struct Config {
     pub simplify_error: f64,
     /// Convex pieces of one part.
     pub max_hulls: u32,
-    /// Pieces of surface smaller than this share of the part's largest piece are dropped, unless views agree on them.
+    /// Pieces of surface smaller than this share of the part's largest piece are dropped, unless
+    /// views agree on them.
     pub crumbs: f64,
     /// At most this many images colour the vertices.
     pub color_views: usize,
 }
 
-/// At most this many images say where the surface is exactly, and a pixel speaks for what lies within this many voxels of its plane.
+/// At most this many images say where the surface is exactly, and a pixel speaks for what lies
+/// within this many voxels of its plane.
 const SNAP_VIEWS: usize = 480;
 const SNAP_REACH: f32 = 1.5;
 /// Share of the collision volume that may be cut away without a word.
@@ -111,7 +114,8 @@ pub fn build<E: From<Cancelled> + Send>(
     })?;
     meshes.iter_mut().zip(&pulls).for_each(|(mesh, pulls)| snap::finish(mesh, pulls, voxel));
     meshes = meshes.par_iter().map(simple).collect();
-    // Root first, then along the tree: every part keeps clear of those before it, also between recorded states.
+    // Root first, then along the tree: every part keeps clear of those before it, also between
+    // recorded states.
     let path: Vec<Vec<Pose>> = poses.iter().cloned().chain(solid::sweeps(tree, CLEARED)).collect();
     let collision: Vec<TriMesh> = (0..fields.len())
         .into_par_iter()

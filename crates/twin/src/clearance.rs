@@ -1,8 +1,9 @@
 //! Room between the collision shapes of different parts.
 //!
-//! Fused surfaces are half a voxel uncertain, and a lid that lies on its rim or a door in its frame touches it:
-//! convex pieces of both would overlap and jam the joint. So the collision shape of a part leaves out what comes
-//! within one voxel of a part nearer to the root in any recorded state. The visual mesh keeps everything.
+//! Fused surfaces are half a voxel uncertain, and a lid that lies on its rim or a door in its frame
+//! touches it: convex pieces of both would overlap and jam the joint. So the collision shape of a
+//! part leaves out what comes within one voxel of a part nearer to the root in any recorded state.
+//! The visual mesh keeps everything.
 
 use crate::field::{Field, ONE_VOXEL};
 use glam::Vec3;

@@ -18,7 +18,8 @@ pub fn accumulate(sum: &mut [f32; 4], g: &Glimpse, tolerance: f32) {
     sum[3] += w;
 }
 
-/// Turns the sums into colours; a vertex that nobody saw takes the mean of its coloured neighbours, else grey.
+/// Turns the sums into colours; a vertex that nobody saw takes the mean of its coloured neighbours,
+/// else grey.
 pub fn finish(mesh: &mut TriMesh, sums: &[[f32; 4]]) {
     let mut colors: Vec<Option<[f32; 3]>> =
         sums.iter().map(|s| (s[3] > 0.0).then(|| [s[0] / s[3], s[1] / s[3], s[2] / s[3]])).collect();

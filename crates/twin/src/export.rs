@@ -1,7 +1,9 @@
-//! The twin folder: `twin.json`, `robot.urdf`, `robot.xml`, `meshes/{visual,collision}`, `splats/<part>.ply`.
+//! The twin folder: `twin.json`, `robot.urdf`, `robot.xml`, `meshes/{visual,collision}`,
+//! `splats/<part>.ply`.
 //!
-//! Link frames: axes of the canonical world; origin on the joint axis nearest the part's centre of mass
-//! (revolute), at the centre of mass (prismatic), at the world origin (root). Mesh files are in link frames.
+//! Link frames: axes of the canonical world; origin on the joint axis nearest the part's centre of
+//! mass (revolute), at the centre of mass (prismatic), at the world origin (root). Mesh files are
+//! in link frames.
 
 use crate::link::{hull_file, link_origin, mean_color, visual_file};
 use crate::{PartModel, Twin, mjcf, urdf};
@@ -30,9 +32,9 @@ pub enum ExportError {
     Ply(#[from] PlyError),
 }
 
-/// Writes the whole folder beside `dir` and renames it into place; what stands there goes, so whoever calls makes sure that it
-/// [`is_ours`]. `splats`: gaussians in the canonical world
-/// and the part of each.
+/// Writes the whole folder beside `dir` and renames it into place; what stands there goes, so
+/// whoever calls makes sure that it [`is_ours`]. `splats`: gaussians in the canonical world and the
+/// part of each.
 ///
 /// # Errors
 /// When the disk refuses; the old folder is then still there.

@@ -35,10 +35,11 @@ impl Field {
         Self { origin, voxel, dims, values: vec![1.0; n], known: vec![true; n], firm: vec![false; n] }
     }
 
-    /// Decides about what nobody saw. `taken(x, deep)` says that canonical point `x` is another part's room: space that no ray reached is
-    /// then not this part's; `deep`: it is far from all seen surface of this part. With `enclosed`, unreached space is solid only where the
-    /// part's own surface encloses it; without (the root, whose underside no camera sees) everywhere. Nothing is solid beyond all surface that was
-    /// seen.
+    /// Decides about what nobody saw. `taken(x, deep)` says that canonical point `x` is another
+    /// part's room: space that no ray reached is then not this part's; `deep`: it is far from all
+    /// seen surface of this part. With `enclosed`, unreached space is solid only where the part's
+    /// own surface encloses it; without (the root, whose underside no camera sees) everywhere.
+    /// Nothing is solid beyond all surface that was seen.
     pub fn close(&mut self, taken: &(dyn Fn(Vec3, bool) -> bool + Sync), enclosed: bool) {
         self.open_beyond_seen();
         if enclosed {
@@ -67,8 +68,9 @@ impl Field {
         self.known[i] && self.values[i] < 0.0
     }
 
-    /// Empties what lies beyond all surface that was seen: below the walls of a cabinet whose underside nobody saw there is no cabinet, and
-    /// a blade seen from above is not thicker than its rim.
+    /// Empties what lies beyond all surface that was seen: below the walls of a cabinet whose
+    /// underside nobody saw there is no cabinet, and a blade seen from above is not thicker than
+    /// its rim.
     fn open_beyond_seen(&mut self) {
         let surface = |i: &usize| self.known[*i] && (-ONE_VOXEL..0.0).contains(&self.values[*i]);
         let seen = Slabs::around((0..self.values.len()).filter(surface).map(|i| self.place(i)));

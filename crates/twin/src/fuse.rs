@@ -1,9 +1,10 @@
 //! Signed distance of one part, fused in the canonical frame from the depth of all states.
 //!
-//! Truncated signed distance in the way of Curless and Levoy 1996 on blocks of 8^3 voxels near the part's
-//! own surface. Three things differ from the usual: a pixel of another part still says that the ray up to it
-//! is empty; a background pixel empties its whole ray; and what no ray ever reached counts as solid, so that
-//! closed things come out closed and have a volume. Units: scene units; frame: canonical world.
+//! Truncated signed distance in the way of Curless and Levoy 1996 on blocks of 8^3 voxels near the
+//! part's own surface. Three things differ from the usual: a pixel of another part still says that
+//! the ray up to it is empty; a background pixel empties its whole ray; and what no ray ever
+//! reached counts as solid, so that closed things come out closed and have a volume. Units: scene
+//! units; frame: canonical world.
 
 use crate::field::{Field, TRUNCATION};
 use crate::{BACKGROUND, Observation, UNKNOWN};
@@ -42,7 +43,8 @@ pub(crate) struct Block {
     pub(crate) key: Key,
     sum: Vec<f32>,
     pub(crate) weight: Vec<f32>,
-    /// Surface pixels that fell into each voxel, and the area that they stand for in units of 1 / [`COVER_UNIT`] of the voxel's face.
+    /// Surface pixels that fell into each voxel, and the area that they stand for in units of 1 /
+    /// [`COVER_UNIT`] of the voxel's face.
     pub(crate) hits: Vec<AtomicU32>,
     pub(crate) cover: Vec<AtomicU32>,
 }
@@ -119,8 +121,8 @@ impl PartVolume {
         true
     }
 
-    /// Second pass: averages a batch of observations in, in their order (deterministic on any thread count).
-    /// `world_from_canonical[i]` is this part's pose in the state of `batch[i]`.
+    /// Second pass: averages a batch of observations in, in their order (deterministic on any
+    /// thread count). `world_from_canonical[i]` is this part's pose in the state of `batch[i]`.
     pub fn integrate(&mut self, batch: &[Observation], world_from_canonical: &[Pose], part: u8) {
         let views: Vec<Ray> = batch.iter().zip(world_from_canonical).map(|(seen, pose)| Ray::new(seen, pose)).collect();
         let (voxel, truncation, size) = (self.voxel, self.truncation, self.block_size());
@@ -167,14 +169,16 @@ impl PartVolume {
         field
     }
 
-    /// Where voxel `i` of block `key` lies in the dense field, which has an empty border of one voxel.
+    /// Where voxel `i` of block `key` lies in the dense field, which has an empty border of one
+    /// voxel.
     pub(crate) fn index(&self, dims: [usize; 3], key: &Key, i: usize) -> usize {
         let at = |a: usize, d: usize| ((key[a] - self.lo[a]) * B) as usize + d + 1;
         (at(0, i / 64) * dims[1] + at(1, i / 8 % 8)) * dims[0] + at(2, i % 8)
     }
 }
 
-/// Counts the part's surface pixels per voxel. Sums of integers: the order of threads does not matter.
+/// Counts the part's surface pixels per voxel. Sums of integers: the order of threads does not
+/// matter.
 fn count_hits(blocks: &[Block], seen: &Observation, world_from_canonical: &Pose, part: u8, voxel: f32) {
     let canonical_from_camera = world_from_canonical.inverse() * seen.camera.camera_from_world.inverse();
     let pixel_area = 1.0 / (seen.camera.fx * seen.camera.fy) as f32;
@@ -271,7 +275,8 @@ impl<'a> Ray<'a> {
                     } else if s > 0.0 {
                         (s, 1.0)
                     } else if label == part && s > -1.0 {
-                        // Behind the surface the weight fades: the far side of a thin sheet is not ours to fill.
+                        // Behind the surface the weight fades: the far side of a thin sheet is not
+                        // ours to fill.
                         (s, 1.0 + s)
                     } else {
                         continue;
@@ -284,7 +289,8 @@ impl<'a> Ray<'a> {
     }
 }
 
-/// Runs both passes over all observations for all parts. `load(i)` gives observation `i`; it is called twice.
+/// Runs both passes over all observations for all parts. `load(i)` gives observation `i`; it is
+/// called twice.
 ///
 /// # Errors
 /// Whatever `load` answers, or [`Cancelled`] from the progress handle.

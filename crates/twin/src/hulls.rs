@@ -5,7 +5,8 @@ use hingecast_geom::TriMesh;
 use parry3d::math::Vector;
 use parry3d::transformation::vhacd::{VHACD, VHACDParameters};
 
-/// Resolution 128 and concavity 0.001 keep a drawer with thin walls open; the defaults fill 3 % of it.
+/// Resolution 128 and concavity 0.001 keep a drawer with thin walls open; the defaults fill 3 % of
+/// it.
 #[derive(Clone, Copy, Debug)]
 pub struct HullConfig {
     /// Voxels along the longest side of the mesh.

@@ -5,7 +5,8 @@
 //!                                                               |--hulls--> collision   |--mass--> inertia
 //! everything --urdf, mjcf, twin.json--> a folder
 //! ```
-//! Every part is fused in its own frame from all states: the inside of a drawer and the back of a door are there.
+//! Every part is fused in its own frame from all states: the inside of a drawer and the back of a
+//! door are there.
 //!
 //! [`fn@build`] makes a [`Twin`], [`fn@write`] puts it on the disk:
 //!

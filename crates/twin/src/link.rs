@@ -1,7 +1,8 @@
 //! What the exports share of a link: its frame, its files, its colour and its damping.
 //!
-//! Link frames: axes of the canonical world; origin on the joint axis nearest the part's centre of mass
-//! (revolute), at the centre of mass (prismatic), at the world origin (root). Mesh files are in link frames.
+//! Link frames: axes of the canonical world; origin on the joint axis nearest the part's centre of
+//! mass (revolute), at the centre of mass (prismatic), at the world origin (root). Mesh files are
+//! in link frames.
 
 use crate::Twin;
 use glam::DVec3;

@@ -4,8 +4,8 @@ use crate::Inertial;
 use glam::{DMat3, DVec3};
 use hingecast_geom::TriMesh;
 
-/// Inertial of the solid that `mesh` encloses. When the mesh encloses too little (a hole, a sheet), the hulls
-/// stand in, then the box; the second value says so.
+/// Inertial of the solid that `mesh` encloses. When the mesh encloses too little (a hole, a sheet),
+/// the hulls stand in, then the box; the second value says so.
 pub fn inertial(mesh: &TriMesh, hulls: &[TriMesh], density: f64) -> (Inertial, Option<String>) {
     let (lo, hi) = mesh.bounds().unwrap_or_default();
     let size = (hi - lo).as_dvec3().max(DVec3::splat(1e-4));
@@ -47,7 +47,8 @@ fn parallel_axis(r: DVec3) -> DMat3 {
     DMat3::from_diagonal(DVec3::splat(r.length_squared())) - DMat3::from_cols(r * r.x, r * r.y, r * r.z)
 }
 
-/// Rounds principal moments up so that they are positive and obey the triangle inequality, which simulators demand.
+/// Rounds principal moments up so that they are positive and obey the triangle inequality, which
+/// simulators demand.
 fn physical(mut i: Inertial) -> Inertial {
     let m = nalgebra::Matrix3::from_fn(|r, c| 0.5 * (i.inertia.col(c)[r] + i.inertia.col(r)[c]));
     let eigen = m.symmetric_eigen();

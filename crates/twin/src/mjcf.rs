@@ -27,8 +27,8 @@ pub fn to_string(twin: &Twin) -> String {
         body(twin, root, DVec3::ZERO, 2, &mut out);
     }
     let _ = writeln!(out, "  </worldbody>\n  <contact>");
-    // Parts that share a joint touch there by construction. MuJoCo filters such pairs itself only when the
-    // parent can move.
+    // Parts that share a joint touch there by construction. MuJoCo filters such pairs itself only
+    // when the parent can move.
     for joint in &twin.tree.joints {
         let _ = writeln!(
             out,

@@ -1,9 +1,10 @@
-//! Parts for pixels that no canonical gaussian explains: surface that was hidden in the first state (the inside
-//! of a drawer, the back of a door).
+//! Parts for pixels that no canonical gaussian explains: surface that was hidden in the first state
+//! (the inside of a drawer, the back of a door).
 //!
-//! Each such point is carried along with every part in turn into the other states. Where some camera looks
-//! through it, it cannot belong to that part; where a surface is measured at it, it may. Labels that the gaussians
-//! gave are put to the same test and lose when the other states clearly prefer another part.
+//! Each such point is carried along with every part in turn into the other states. Where some
+//! camera looks through it, it cannot belong to that part; where a surface is measured at it, it
+//! may. Labels that the gaussians gave are put to the same test and lose when the other states
+//! clearly prefer another part.
 
 use crate::{BACKGROUND, Observation};
 use glam::{DVec3, Vec3};
@@ -35,15 +36,17 @@ struct Verdict {
     support: u32,
 }
 
-/// Votes (states) by which another part must lead to take a point from the part that the gaussians gave it.
+/// Votes (states) by which another part must lead to take a point from the part that the gaussians
+/// gave it.
 const CLEARLY: u32 = 3;
 
 /// A cube of one state's surface and the label that its points carry.
 type Cell = ([i32; 3], u8);
 
-/// Gives unknown pixels that have depth the part with the fewest contradictions, then the most support; ties go to
-/// the lowest part (the root). `labels[i]` are those of observation `i`; `poses[state][part]` world from canonical;
-/// `cell` is the edge of the cubes in which points are judged together, scene units.
+/// Gives unknown pixels that have depth the part with the fewest contradictions, then the most
+/// support; ties go to the lowest part (the root). `labels[i]` are those of observation `i`;
+/// `poses[state][part]` world from canonical; `cell` is the edge of the cubes in which points are
+/// judged together, scene units.
 ///
 /// # Errors
 /// What `load` answers.
@@ -140,8 +143,8 @@ fn for_surface(seen: &Observation, labels: &[u8], emit: &mut dyn FnMut(usize, DV
     }
 }
 
-/// One state's answer about a world point: one vote against when a camera sees through it, else one vote for when a
-/// camera measures a surface there.
+/// One state's answer about a world point: one vote against when a camera sees through it, else one
+/// vote for when a camera measures a surface there.
 fn ask(x: Vec3, witnesses: &[Witness], tolerance: f32) -> Verdict {
     let (mut through, mut hit) = (0, 0);
     for w in witnesses {

@@ -1,9 +1,10 @@
 //! Convex pieces of different parts that still overlap in a recorded state, cut apart.
 //!
-//! A convex piece reaches a little beyond the surface that it stands for. Where a piece of a moving part overlaps
-//! one of a part nearer to the root, it is cut along a plane that supports the still piece: of those along its faces and
-//! that of the minimal translation (GJK/EPA) the one that leaves the most. (The minimal translation alone cuts a thin lid
-//! through its thickness where its rim sinks in.) What loses nearly everything is dropped.
+//! A convex piece reaches a little beyond the surface that it stands for. Where a piece of a moving
+//! part overlaps one of a part nearer to the root, it is cut along a plane that supports the still
+//! piece: of those along its faces and that of the minimal translation (GJK/EPA) the one that
+//! leaves the most. (The minimal translation alone cuts a thin lid through its thickness where its
+//! rim sinks in.) What loses nearly everything is dropped.
 
 use glam::{Mat3, Vec3};
 use hingecast_geom::{Pose, TriMesh};
@@ -47,9 +48,9 @@ fn piece(hull: &TriMesh) -> Option<Piece> {
     Some(Piece { shape: ConvexPolyhedron::from_convex_hull(&points)?, lo, hi, normals })
 }
 
-/// Cuts `hulls[part]` for all parts in `order` (root first) clear of the parts before it, in all states.
-/// `poses[state][part]`: world from canonical; `clearance`: the gap to leave, scene units. Answers how many pieces were
-/// dropped.
+/// Cuts `hulls[part]` for all parts in `order` (root first) clear of the parts before it, in all
+/// states. `poses[state][part]`: world from canonical; `clearance`: the gap to leave, scene units.
+/// Answers how many pieces were dropped.
 pub fn separate(hulls: &mut [Vec<TriMesh>], order: &[usize], poses: &[Vec<Pose>], clearance: f32) -> usize {
     let mut dropped = 0;
     for (k, &part) in order.iter().enumerate() {

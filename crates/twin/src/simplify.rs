@@ -2,7 +2,8 @@
 
 use hingecast_geom::TriMesh;
 
-/// Collapses edges until `max_faces` are left or the surface would move by more than `max_error` (scene units).
+/// Collapses edges until `max_faces` are left or the surface would move by more than `max_error`
+/// (scene units).
 pub fn simplify(mesh: &TriMesh, max_faces: usize, max_error: f32) -> TriMesh {
     if mesh.is_empty() {
         return mesh.clone();

@@ -1,5 +1,6 @@
-//! The box with bevelled edges and corners around some points: a convex hull of thirteen fixed directions (a k-DOP, Klosowski et al.
-//! 1998). Asked for millions of voxels, where a true hull would take long.
+//! The box with bevelled edges and corners around some points: a convex hull of thirteen fixed
+//! directions (a k-DOP, Klosowski et al. 1998). Asked for millions of voxels, where a true hull
+//! would take long.
 
 use glam::Vec3;
 

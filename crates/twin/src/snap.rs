@@ -1,15 +1,17 @@
-//! Vertices onto the planes that pixels measured. A mesh out of voxels knows its surface to a third of a voxel where it is thin or bent;
-//! the pixels that show a vertex know it far better.
+//! Vertices onto the planes that pixels measured. A mesh out of voxels knows its surface to a third
+//! of a voxel where it is thin or bent; the pixels that show a vertex know it far better.
 //!
-//! A vertex x is moved by the d that minimises sum_i w_i (m_i . (x + d) - c_i)^2 + l |d|^2 over the planes (m_i, c_i) of the pixels that
-//! show it in all states (quadrics as in dual contouring, Ju et al. 2002): onto a face, and into an edge where two faces meet.
+//! A vertex x is moved by the d that minimises sum_i w_i (m_i . (x + d) - c_i)^2 + l |d|^2 over the
+//! planes (m_i, c_i) of the pixels that show it in all states (quadrics as in dual contouring, Ju
+//! et al. 2002): onto a face, and into an edge where two faces meet.
 
 use crate::Observation;
 use crate::vertices::Glimpse;
 use glam::{Mat3, Vec3};
 use hingecast_geom::TriMesh;
 
-/// Weight of staying where it is: a share of that of all planes, and a part of one plane seen face on.
+/// Weight of staying where it is: a share of that of all planes, and a part of one plane seen face
+/// on.
 const STAY: [f32; 2] = [0.02, 0.05];
 /// Pixels that a neighbour may be off a pixel's plane before the plane counts half.
 const BENT: f32 = 0.1;
@@ -48,8 +50,9 @@ pub fn accumulate(pull: &mut Pull, g: &Glimpse, reach: f32) {
     pull.way += w * r * m;
 }
 
-/// The plane n . X = 1 (camera frame) of a pixel of `part` whose four neighbours are the part's too, and how far the worst of them is
-/// off it, in pixels. Inverse depth is affine in the ray's slopes over a plane.
+/// The plane n . X = 1 (camera frame) of a pixel of `part` whose four neighbours are the part's
+/// too, and how far the worst of them is off it, in pixels. Inverse depth is affine in the ray's
+/// slopes over a plane.
 fn plane(seen: &Observation, i: usize, part: u8) -> Option<(Vec3, f32)> {
     let c = &seen.camera;
     let (u, v) = (i % c.width, i / c.width);

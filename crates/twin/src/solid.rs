@@ -6,7 +6,8 @@ use crate::slabs::Slabs;
 use glam::Vec3;
 use hingecast_geom::{KinematicTree, Pose};
 
-/// Steps over a joint's range in which a part empties what it passes through: the back of a drawer is a thin board.
+/// Steps over a joint's range in which a part empties what it passes through: the back of a drawer
+/// is a thin board.
 const BETWEEN: usize = 120;
 
 /// The fields of all parts; `poses[state][part]`: world from canonical.
@@ -26,8 +27,9 @@ pub fn fields(volumes: Vec<Option<PartVolume>>, tree: &KinematicTree, poses: &[V
                 (field, hull, path.iter().map(|at| at[q].inverse() * at[part]).collect())
             })
             .collect();
-        // What a drawer fills is not the cabinet's, where no ray can tell; and far from what is seen of this part, the hollow of the other is
-        // empty as well: nothing of a cabinet is in its drawer.
+        // What a drawer fills is not the cabinet's, where no ray can tell; and far from what is
+        // seen of this part, the hollow of the other is empty as well: nothing of a cabinet is in
+        // its drawer.
         let taken = |x: Vec3, deep: bool| {
             done.iter().any(|(field, hull, into)| {
                 into.iter().any(|pose| {

@@ -1,5 +1,6 @@
-//! The zero surface of a field as triangles: naive surface nets (Gibson 1998), one vertex per crossed cell,
-//! one quad per crossed edge. Closed wherever the field's border is outside. Also drops crumbs.
+//! The zero surface of a field as triangles: naive surface nets (Gibson 1998), one vertex per
+//! crossed cell, one quad per crossed edge. Closed wherever the field's border is outside. Also
+//! drops crumbs.
 
 use crate::field::Field;
 use glam::Vec3;
@@ -11,7 +12,8 @@ const CORNERS: [[usize; 3]; 8] =
 const EDGES: [[usize; 2]; 12] =
     [[0, 1], [2, 3], [4, 5], [6, 7], [0, 2], [1, 3], [4, 6], [5, 7], [0, 4], [1, 5], [2, 6], [3, 7]];
 
-/// Triangles of the zero level, counter-clockwise from outside (positive side), in the field's frame.
+/// Triangles of the zero level, counter-clockwise from outside (positive side), in the field's
+/// frame.
 pub fn extract(field: &Field) -> TriMesh {
     let [nx, ny, nz] = field.dims;
     let mut vertex_of = vec![u32::MAX; nx * ny * nz];
@@ -87,8 +89,8 @@ pub fn extract(field: &Field) -> TriMesh {
 /// Vertices of the smallest piece that can be more than a few stray voxels.
 const SMALLEST: usize = 24;
 
-/// Keeps the connected pieces whose area is at least `fraction` of the largest's, and smaller ones that are `firm` at half of their
-/// vertices or more: a handle stands off its door.
+/// Keeps the connected pieces whose area is at least `fraction` of the largest's, and smaller ones
+/// that are `firm` at half of their vertices or more: a handle stands off its door.
 pub fn drop_crumbs(mesh: &TriMesh, fraction: f64, firm: &dyn Fn(Vec3) -> bool) -> TriMesh {
     let piece = mesh.pieces(|i| i);
     let mut area = BTreeMap::<u32, f64>::new();

@@ -1,5 +1,5 @@
-//! Sheets and bars thinner than a voxel: front and back, averaged, leave nothing negative, and pixels beside a bar look past it. What many
-//! pixels saw all the same is made solid again.
+//! Sheets and bars thinner than a voxel: front and back, averaged, leave nothing negative, and
+//! pixels beside a bar look past it. What many pixels saw all the same is made solid again.
 
 use crate::field::Field;
 use crate::fuse::{BLOCK, COVER_UNIT, PartVolume};
@@ -13,13 +13,15 @@ const SHEET: f32 = 0.1;
 const HITS: u32 = 4;
 /// Kept when the average distance to the surface is below three quarters of a voxel ...
 const VALUE: f32 = 0.25;
-/// ... or when the pixels cover this share of the voxel's face in the mean over all views, and together with the best of the six
-/// beside it (a bar seldom lies in the middle of its voxels) that share.
+/// ... or when the pixels cover this share of the voxel's face in the mean over all views, and
+/// together with the best of the six beside it (a bar seldom lies in the middle of its voxels) that
+/// share.
 const COVER: f32 = 0.2;
 const COVER_OF_TWO: f32 = 0.3;
 
 impl PartVolume {
-    /// Notes in `field` which voxels hold surface for sure, and makes those of thin things solid that the average has lost.
+    /// Notes in `field` which voxels hold surface for sure, and makes those of thin things solid
+    /// that the average has lost.
     pub(crate) fn keep_thin(&self, field: &mut Field) {
         let mut cover = vec![0.0f32; field.values.len()];
         let mut touched = Vec::new();

@@ -1,4 +1,5 @@
-//! URDF text of a twin. Written by hand: the format is small, and the reader in the tests is someone else's.
+//! URDF text of a twin. Written by hand: the format is small, and the reader in the tests is
+//! someone else's.
 
 use crate::Twin;
 use crate::link::{damping, hull_file, link_origin, mean_color, visual_file};

@@ -8,7 +8,8 @@ use rayon::prelude::*;
 /// Shows at most so many observations to a visitor, evenly chosen, in batches.
 pub type Shown<'a, E> = dyn Fn(usize, &mut dyn FnMut(&[Observation])) -> Result<(), E> + 'a;
 
-/// A vertex before a pixel: in front of the camera and in the picture, but perhaps behind something.
+/// A vertex before a pixel: in front of the camera and in the picture, but perhaps behind
+/// something.
 pub struct Glimpse<'a> {
     /// The observation that the pixel belongs to.
     pub seen: &'a Observation,
@@ -24,7 +25,8 @@ pub struct Glimpse<'a> {
     pub rot: Mat3,
 }
 
-/// Lets the vertices of all parts collect what at most `views` observations `say`. `poses[state][part]`: world from canonical. [part][vertex]
+/// Lets the vertices of all parts collect what at most `views` observations `say`.
+/// `poses[state][part]`: world from canonical. [part][vertex]
 ///
 /// # Errors
 /// What `shown` answers.

@@ -1,4 +1,5 @@
-//! A hollow box with a hinged lid, ray-cast analytically, fused and exported: sizes, masses and joints must come back.
+//! A hollow box with a hinged lid, ray-cast analytically, fused and exported: sizes, masses and
+//! joints must come back.
 
 use glam::{DVec2, DVec3};
 use hingecast_geom::{Camera, Cancelled, Joint, JointKind, KinematicTree, Progress, Screw};
@@ -147,7 +148,8 @@ fn sizes_masses_and_joints_come_back() {
     assert!((origin - DVec3::new(-0.2, 0.0, 0.2)).length() < 0.01, "{origin}");
 }
 
-/// Four states and no joint: whatever moved was not recognised. Once this was an index out of bounds.
+/// Four states and no joint: whatever moved was not recognised. Once this was an index out of
+/// bounds.
 #[test]
 fn a_recording_in_which_no_part_was_found_to_move_has_a_twin_of_one_part() {
     let tree = KinematicTree { parts: vec!["base".into()], joints: Vec::new() };
@@ -171,7 +173,8 @@ fn a_recording_in_which_no_part_was_found_to_move_has_a_twin_of_one_part() {
     assert!(!twin.parts[0].mesh.is_empty());
 }
 
-/// A bar of half a voxel, less than half a pixel wide, between two posts on the lid: what a hand would hold.
+/// A bar of half a voxel, less than half a pixel wide, between two posts on the lid: what a hand
+/// would hold.
 #[test]
 fn a_thin_handle_stays_on_its_door() {
     let mut parts = slabs();

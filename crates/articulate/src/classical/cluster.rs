@@ -1,9 +1,10 @@
-//! Clustering of feature rows: k-means++ (Arthur and Vassilvitskii 2007), HDBSCAN from a crate, and the mean
-//! silhouette (Rousseeuw 1987) that chooses between part counts.
+//! Clustering of feature rows: k-means++ (Arthur and Vassilvitskii 2007), HDBSCAN from a crate, and
+//! the mean silhouette (Rousseeuw 1987) that chooses between part counts.
 
 use rayon::prelude::*;
 
-/// Lloyd's iterations from the best of `restarts` k-means++ seedings. `rows` are (n, d). Label per row.
+/// Lloyd's iterations from the best of `restarts` k-means++ seedings. `rows` are (n, d). Label per
+/// row.
 pub fn kmeans(rows: &[Vec<f32>], k: usize, restarts: usize, seed: u64) -> Vec<usize> {
     let mut best: Option<(f64, Vec<usize>)> = None;
     for restart in 0..restarts {
@@ -25,7 +26,8 @@ fn kmeans_once(rows: &[Vec<f32>], k: usize, seed: u64) -> (f64, Vec<usize>) {
     if n == 0 || k == 0 {
         return (0.0, vec![0; n]);
     }
-    // Seeds spread out: each next one drawn with probability proportional to its squared distance to the rest.
+    // Seeds spread out: each next one drawn with probability proportional to its squared distance
+    // to the rest.
     let mut centres = vec![rows[rng.usize(0..n)].clone()];
     let mut nearest: Vec<f32> = vec![f32::INFINITY; n];
     while centres.len() < k {
@@ -68,8 +70,8 @@ fn kmeans_once(rows: &[Vec<f32>], k: usize, seed: u64) -> (f64, Vec<usize>) {
     (cost, labels)
 }
 
-/// HDBSCAN labels; noise (which the algorithm leaves out) goes to the cluster of its nearest labelled row.
-/// `None` when it finds fewer than two clusters.
+/// HDBSCAN labels; noise (which the algorithm leaves out) goes to the cluster of its nearest
+/// labelled row. `None` when it finds fewer than two clusters.
 pub fn hdbscan(rows: &[Vec<f32>], min_cluster: usize) -> Option<Vec<usize>> {
     let parameters = hdbscan::HdbscanHyperParams::builder().min_cluster_size(min_cluster).min_samples(10).build();
     let labels = hdbscan::Hdbscan::new(rows, parameters).cluster().ok()?;
@@ -91,7 +93,8 @@ pub fn hdbscan(rows: &[Vec<f32>], min_cluster: usize) -> Option<Vec<usize>> {
     Some(out)
 }
 
-/// Mean silhouette from a dissimilarity matrix (n, n): 1 = well apart, 0 = on the border, below = wrong cluster.
+/// Mean silhouette from a dissimilarity matrix (n, n): 1 = well apart, 0 = on the border, below =
+/// wrong cluster.
 pub fn silhouette(dissimilarity: &[Vec<f32>], labels: &[usize]) -> f64 {
     let n = labels.len();
     let k = labels.iter().max().map_or(0, |m| m + 1);

@@ -1,6 +1,8 @@
-//! A revolute axis from the points that a motion leaves in place, by RANSAC (Fischler and Bolles 1981).
+//! A revolute axis from the points that a motion leaves in place, by RANSAC (Fischler and Bolles
+//! 1981).
 //!
-//! Candidates are the part's own points and a lattice around it: a hinge is seldom on the part that it carries.
+//! Candidates are the part's own points and a lattice around it: a hinge is seldom on the part that
+//! it carries.
 
 use glam::DVec3;
 use hingecast_geom::Pose;
@@ -48,7 +50,8 @@ pub fn fixed(candidates: &[DVec3], motions: &[Pose], rule: Rule) -> Vec<DVec3> {
     order[..keep].iter().map(|&i| candidates[i]).collect()
 }
 
-/// Line (point, unit direction) through `points` with most within `tolerance`, then least squares on these.
+/// Line (point, unit direction) through `points` with most within `tolerance`, then least squares
+/// on these.
 pub fn ransac_line(points: &[DVec3], tolerance: f64, seed: u64) -> Option<(DVec3, DVec3)> {
     if points.len() < 2 {
         return None;

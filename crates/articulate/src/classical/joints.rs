@@ -1,4 +1,5 @@
-//! From rigid motions of parts to joints: no rotation means prismatic, else a hinge through the fixed points.
+//! From rigid motions of parts to joints: no rotation means prismatic, else a hinge through the
+//! fixed points.
 
 use super::fixed_points::{Rule, fixed, lattice, ransac_line};
 use super::segment::Segmentation;
@@ -17,7 +18,8 @@ pub struct Config {
     pub lattice: f64,
     /// The lattice reaches this share of the diagonal beyond the part.
     pub margin: f64,
-    /// The motion "has no rotation" when the part's rim turns by less than this share of what its middle shifts.
+    /// The motion "has no rotation" when the part's rim turns by less than this share of what its
+    /// middle shifts.
     pub prismatic_share: f64,
 }
 
@@ -98,7 +100,8 @@ fn fit(
         return (Screw { kind: JointKind::Prismatic, axis, pivot: centre }, values);
     }
 
-    // Motions that hardly turn say little about where the axis is; weigh by using those that turn enough.
+    // Motions that hardly turn say little about where the axis is; weigh by using those that turn
+    // enough.
     let strongest = motions.iter().map(Pose::angle).fold(0.0, f64::max);
     let telling: Vec<Pose> = motions.iter().filter(|m| m.angle() > 0.3 * strongest).copied().collect();
     let (mut lo, mut hi) = (centre, centre);

@@ -1,4 +1,5 @@
-//! The classical way (`--method track`): gaussians of several states, carried from one to the next, grouped, and their axes fitted.
+//! The classical way (`--method track`): gaussians of several states, carried from one to the next,
+//! grouped, and their axes fitted.
 //!
 //! ```text
 //! track         gaussians of the first state carried from state to state (Dynamic 3D Gaussians)

@@ -4,7 +4,8 @@ use glam::{DMat3, DQuat, DVec3};
 use hingecast_geom::Pose;
 use nalgebra::{Matrix3, Vector3};
 
-/// The pose `b_from_a` that minimises sum w |b - (R a + t)|^2. `None` with fewer than three points or no weight.
+/// The pose `b_from_a` that minimises sum w |b - (R a + t)|^2. `None` with fewer than three points
+/// or no weight.
 pub fn kabsch(a: &[DVec3], b: &[DVec3], weights: &[f64]) -> Option<Pose> {
     let total: f64 = weights.iter().sum();
     if a.len() < 3 || !(total > 0.0) {
@@ -26,8 +27,8 @@ pub fn kabsch(a: &[DVec3], b: &[DVec3], weights: &[f64]) -> Option<Pose> {
     rot.is_finite().then(|| Pose::new(rot, cb - rot * ca))
 }
 
-/// Kabsch with Geman-McClure weights whose scale shrinks to the residuals' median: gaussians that slid off
-/// their part lose their say. Answers the pose and the median residual.
+/// Kabsch with Geman-McClure weights whose scale shrinks to the residuals' median: gaussians that
+/// slid off their part lose their say. Answers the pose and the median residual.
 pub fn robust_kabsch(a: &[DVec3], b: &[DVec3]) -> Option<(Pose, f64)> {
     let mut weights = vec![1.0; a.len()];
     let mut pose = kabsch(a, b, &weights)?;

@@ -1,4 +1,5 @@
-//! The local-rigidity losses of Dynamic 3D Gaussians (Luiten et al. 2024, eqs. 5-8) with analytic gradients.
+//! The local-rigidity losses of Dynamic 3D Gaussians (Luiten et al. 2024, eqs. 5-8) with analytic
+//! gradients.
 //!
 //! For gaussian i, neighbour j, previous state p:
 //! ```text
@@ -6,8 +7,9 @@
 //! rotation  w | q_j q_j,p^-1   -  q_i q_i,p^-1 |                 neighbours turn alike
 //! isometry  w | |x_j - x_i|_0  -  |x_j - x_i| |                  distances stay as in the first state
 //! ```
-//! each averaged over all pairs; w = exp(-d_ij^2 / (2 h^2)) with h the mean neighbour distance, so that the
-//! falloff follows the object's size. Lengths are divided by the diagonal before they are weighed.
+//! each averaged over all pairs; w = exp(-d_ij^2 / (2 h^2)) with h the mean neighbour distance, so
+//! that the falloff follows the object's size. Lengths are divided by the diagonal before they are
+//! weighed.
 
 use rayon::prelude::*;
 
@@ -32,14 +34,15 @@ impl Default for PhysicsWeights {
     }
 }
 
-/// What a gaussian's neighbours need to know of it, in half a cache line: position, padding, what turned it
-/// since the previous state (u = q q_p^-1).
+/// What a gaussian's neighbours need to know of it, in half a cache line: position, padding, what
+/// turned it since the previous state (u = q q_p^-1).
 type Node = [f32; 8];
 
 /// Gradient that an edge i -> j exerts on j (and, negated, on i): by the position, padding, by u.
 type Edge = [f32; 8];
 
-/// The fixed graph of neighbours from the first state, and the state before the one that is being fitted.
+/// The fixed graph of neighbours from the first state, and the state before the one that is being
+/// fitted.
 pub struct Neighbourhood {
     /// (n, K) indices.
     index: Vec<u32>,
@@ -59,7 +62,8 @@ pub struct Neighbourhood {
 }
 
 impl Neighbourhood {
-    /// `near[i]`: the K nearest neighbours of gaussian i in the first state, whose positions are `means`.
+    /// `near[i]`: the K nearest neighbours of gaussian i in the first state, whose positions are
+    /// `means`.
     ///
     /// # Panics
     /// When a list does not hold exactly K neighbours.
@@ -92,7 +96,8 @@ impl Neighbourhood {
         Self { index, weight, rest, start, reverse, inv_diagonal, previous_quats, previous_offsets, edges }
     }
 
-    /// Sets the state before the one to be fitted: positions and quaternions (wxyz, any length > 0).
+    /// Sets the state before the one to be fitted: positions and quaternions (wxyz, any length >
+    /// 0).
     pub fn set_previous(&mut self, means: &[[f32; 3]], quats: &[[f32; 4]]) {
         self.previous_quats = quats.iter().map(|q| unit(*q)).collect();
         let (index, quats) = (&self.index, &self.previous_quats);
@@ -110,8 +115,8 @@ impl Neighbourhood {
             .collect();
     }
 
-    /// Adds the gradients of the three losses at `means`, `quats` (wxyz, any length > 0) to `grad_means`,
-    /// `grad_quats`. Answers the loss. The same bytes on any number of threads.
+    /// Adds the gradients of the three losses at `means`, `quats` (wxyz, any length > 0) to
+    /// `grad_means`, `grad_quats`. Answers the loss. The same bytes on any number of threads.
     ///
     /// # Panics
     /// When no previous state of the same size was set.
@@ -134,7 +139,8 @@ impl Neighbourhood {
             })
             .collect();
 
-        // First pass, by source gaussian: per-edge gradients, and the rigid loss's gradient of the own rotation.
+        // First pass, by source gaussian: per-edge gradients, and the rigid loss's gradient of the
+        // own rotation.
         let scales = [weights.rigid * self.inv_diagonal, weights.isometry * self.inv_diagonal, weights.rotation];
         let (index, weight, rest, offsets) = (&self.index, &self.weight, &self.rest, &self.previous_offsets);
         let own: Vec<(f32, [f32; 4])> = self
@@ -156,7 +162,8 @@ impl Neighbourhood {
             })
             .collect();
 
-        // Second pass, by receiving gaussian: its own edges pull with -g, the edges that end in it with +g.
+        // Second pass, by receiving gaussian: its own edges pull with -g, the edges that end in it
+        // with +g.
         let (edges, start, reverse) = (&self.edges, &self.start, &self.reverse);
         let receive = |(i, (gm, gq)): (usize, (&mut [f32; 3], &mut [f32; 4]))| {
             let mut sum = [0.0f32; 8];
@@ -168,7 +175,8 @@ impl Neighbourhood {
                 (0..8).for_each(|a| sum[a] += edge[a]);
             }
             (0..3).for_each(|a| gm[a] += sum[a]);
-            // u = q p^-1: right multiplication by a unit quaternion is orthogonal, its transpose multiplies by p.
+            // u = q p^-1: right multiplication by a unit quaternion is orthogonal, its transpose
+            // multiplies by p.
             let from_u = multiply([sum[4], sum[5], sum[6], sum[7]], previous_quats[i]);
             let total: [f32; 4] = std::array::from_fn(|a| from_u[a] + own[i].1[a]);
             // Through the normalisation q / |q|.
@@ -192,8 +200,9 @@ struct Source<'a> {
     offsets: &'a [[f32; K]; 3],
 }
 
-/// The first pass for one gaussian: writes its edges' gradients, answers the loss and dL/dq by its own rotation.
-/// `scales`: rigid, isometry, rotation. The widest vectors that the CPU has; the bits are the same with any.
+/// The first pass for one gaussian: writes its edges' gradients, answers the loss and dL/dq by its
+/// own rotation. `scales`: rigid, isometry, rotation. The widest vectors that the CPU has; the bits
+/// are the same with any.
 fn pull(source: &Source, nodes: &[Node], scales: &[f32; 3], edges: &mut [Edge]) -> (f32, [f32; 4]) {
     #[cfg(target_arch = "x86_64")]
     {
@@ -209,7 +218,8 @@ fn pull(source: &Source, nodes: &[Node], scales: &[f32; 3], edges: &mut [Edge]) 
     pull_lanes(source, nodes, scales, edges)
 }
 
-/// Neighbours in lanes: every loop over `k` is one formula for all K edges, which the compiler turns into vectors.
+/// Neighbours in lanes: every loop over `k` is one formula for all K edges, which the compiler
+/// turns into vectors.
 #[inline(always)]
 fn pull_lanes(source: &Source, nodes: &[Node], scales: &[f32; 3], edges: &mut [Edge]) -> (f32, [f32; 4]) {
     let (mut d, mut du) = ([[0.0f32; K]; 3], [[0.0f32; K]; 4]);

@@ -1,8 +1,8 @@
 //! Parts as groups of gaussians whose distances to each other stay the same in all states.
 //!
-//! On a bounded number of gaussians the matrix D_ij = max over states |d_ij(s) - d_ij(0)| is clustered (its rows
-//! are the features); rigid motions of the clusters then carry the labels to all gaussians and settle the
-//! borders, which the distances alone leave vague near a hinge.
+//! On a bounded number of gaussians the matrix D_ij = max over states |d_ij(s) - d_ij(0)| is
+//! clustered (its rows are the features); rigid motions of the clusters then carry the labels to
+//! all gaussians and settle the borders, which the distances alone leave vague near a hinge.
 
 use super::cluster;
 use super::motion::robust_kabsch;
@@ -86,7 +86,8 @@ pub fn run(
     let change = distance_change(tracks, &sample);
     progress.check()?;
 
-    // The tracking's own jitter: what half of each gaussian's nearest neighbours' distances change by anyway.
+    // The tracking's own jitter: what half of each gaussian's nearest neighbours' distances change
+    // by anyway.
     let largest = change.par_iter().map(|r| r.iter().copied().fold(0.0, f32::max)).reduce(|| 0.0, f32::max);
     let mut silhouettes = Vec::new();
     let labels_of_sample = if (largest as f64) < config.noise * diagonal && config.parts == 0 {
@@ -211,8 +212,9 @@ pub fn rigid_motions(tracks: &Trajectories, labels: &[Option<u8>], k: usize) -> 
         .collect()
 }
 
-/// The part whose motion explains each gaussian's track with the least squared error over all states; with
-/// neighbours given, their errors are averaged in, so that single stragglers follow their surroundings.
+/// The part whose motion explains each gaussian's track with the least squared error over all
+/// states; with neighbours given, their errors are averaged in, so that single stragglers follow
+/// their surroundings.
 fn assign(tracks: &Trajectories, motions: &[Vec<Pose>], neighbours: Option<&Vec<Vec<u32>>>) -> Vec<u8> {
     let n = tracks.means[0].len();
     let k = motions.len();
@@ -240,7 +242,8 @@ fn assign(tracks: &Trajectories, motions: &[Vec<Pose>], neighbours: Option<&Vec<
         .collect()
 }
 
-/// Puts the part that moves least first, drops parts that are too small, merges parts with the same motion.
+/// Puts the part that moves least first, drops parts that are too small, merges parts with the same
+/// motion.
 fn sort_and_merge(
     tracks: &Trajectories,
     labels: &[Option<u8>],

@@ -1,8 +1,9 @@
 //! Gaussians carried from state to state: Dynamic 3D Gaussians (Luiten et al. 2024).
 //!
-//! Each state starts where constant velocity would bring every gaussian (x + (x - x_p), likewise for rotations);
-//! then means and quaternions follow the pictures under the rigidity losses of [`super::physics`]. Scales and
-//! opacities stay those of the first state; colours may follow the light a little.
+//! Each state starts where constant velocity would bring every gaussian (x + (x - x_p), likewise
+//! for rotations); then means and quaternions follow the pictures under the rigidity losses of
+//! [`super::physics`]. Scales and opacities stay those of the first state; colours may follow the
+//! light a little.
 
 use super::neighbours::neighbours;
 use super::physics::{K, Neighbourhood, PhysicsWeights};
@@ -42,8 +43,9 @@ struct Past {
 /// Keeps a finished state: its number, means, quaternions.
 pub type Save<'a, E> = dyn FnMut(usize, &[[f32; 3]], &[[f32; 4]]) -> Result<(), E> + 'a;
 
-/// Tracks `first` (state 0) through all states. `targets(s)` gives the training views of state s; `done` holds the
-/// states of an earlier, interrupted run; `save(s, means, quats)` is called after each state.
+/// Tracks `first` (state 0) through all states. `targets(s)` gives the training views of state s;
+/// `done` holds the states of an earlier, interrupted run; `save(s, means, quats)` is called after
+/// each state.
 ///
 /// # Errors
 /// What `targets` and `save` answer, the engine's complaints, [`Cancelled`].
@@ -112,8 +114,8 @@ pub fn run<E: From<SplatError> + From<Cancelled>>(
         save(state, &now.means, &now.quats)?;
         tracks.means.push(now.means);
         tracks.quats.push(now.quats);
-        // Only means and quaternions are saved: the colours of every state start from the first one's, or a resumed
-        // run would take other steps than an uninterrupted one.
+        // Only means and quaternions are saved: the colours of every state start from the first
+        // one's, or a resumed run would take other steps than an uninterrupted one.
         let params = engine.params_mut();
         first.sh0.iter().enumerate().for_each(|(i, color)| params.set(plane::SH0, i, *color));
     }

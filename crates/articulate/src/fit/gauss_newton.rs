@@ -1,8 +1,10 @@
-//! The last digits: all joints and their values by Gauss-Newton in f64, point to plane, between all states.
+//! The last digits: all joints and their values by Gauss-Newton in f64, point to plane, between all
+//! states.
 //!
-//! A sample of part k seen in state a is carried to state t by M = P_k(t) P_k(a)^-1 and compared with the plane measured
-//! there: r = n . (M x - y). Every joint on the way from k to the root moves it: a change of a parameter turns
-//! P_k(t) into exp(xi_t) P_k(t), with the twist xi in the world frame, so dr = n . (xi_t(M x) - R_M xi_a(x)).
+//! A sample of part k seen in state a is carried to state t by M = P_k(t) P_k(a)^-1 and compared
+//! with the plane measured there: r = n . (M x - y). Every joint on the way from k to the root
+//! moves it: a change of a parameter turns P_k(t) into exp(xi_t) P_k(t), with the twist xi in the
+//! world frame, so dr = n . (xi_t(M x) - R_M xi_a(x)).
 
 use super::unknowns::{Slot, slots, update};
 use crate::model::estimate::FitReport;
@@ -27,7 +29,8 @@ pub struct Settings {
 }
 
 impl Settings {
-    /// Six rounds, each sample against six other states, whose gate narrows from `first` to `last` voxels. `voxel`: scene units.
+    /// Six rounds, each sample against six other states, whose gate narrows from `first` to `last`
+    /// voxels. `voxel`: scene units.
     pub fn narrowing(first: f64, last: f64, voxel: f32) -> Self {
         Self { gates: [first * voxel as f64, last * voxel as f64], rounds: 6, partners: 6 }
     }
@@ -91,8 +94,8 @@ pub fn gauss_newton(
     report
 }
 
-/// Mean over all comparisons of r^2 / gate^2, 1 where no surface was found, as a first round of [`gauss_newton`] with this gate would report
-/// it.
+/// Mean over all comparisons of r^2 / gate^2, 1 where no surface was found, as a first round of
+/// [`gauss_newton`] with this gate would report it.
 pub fn cost(
     evidence: &Evidence,
     tree: &KinematicTree,
@@ -124,12 +127,15 @@ const LEAST_REACH: f32 = 1.2;
 const SMALL: f64 = 0.25;
 /// Members that tell how far a step moves them: every so many.
 const TELLING: usize = 29;
-/// Damping of the first try, shares of the diagonal; each further try takes the next one. The last resort is to stay.
+/// Damping of the first try, shares of the diagonal; each further try takes the next one. The last
+/// resort is to stay.
 const DAMPING: [f64; 4] = [1e-6, 0.03, 1.0, 30.0];
 
-/// Takes the step that the sums ask for, shortened until it keeps what it promises, or none. Answers the normal matrix, decomposed.
+/// Takes the step that the sums ask for, shortened until it keeps what it promises, or none.
+/// Answers the normal matrix, decomposed.
 ///
-/// Few members of a drawer tell whether it rises on its way; a step away from them loses them all, and then nothing pulls it back.
+/// Few members of a drawer tell whether it rises on its way; a step away from them loses them all,
+/// and then nothing pulls it back.
 fn step(ask: &Round, tree: &mut KinematicTree, sums: &Sums) -> Option<Cholesky<f64, Dyn>> {
     // Unseen states keep their value; a joint that nothing constrains keeps its place.
     let scale = sums.a.diagonal().max().max(1e-12);
@@ -154,7 +160,8 @@ fn step(ask: &Round, tree: &mut KinematicTree, sums: &Sums) -> Option<Cholesky<f
 }
 
 impl Round<'_> {
-    /// How far some members are apart under the two trees, where states are compared with the first; scene units.
+    /// How far some members are apart under the two trees, where states are compared with the
+    /// first; scene units.
     fn farthest(&self, old: &KinematicTree, new: &KinematicTree) -> f64 {
         let n_states = self.evidence.n_states();
         let poses = |tree: &KinematicTree| -> Vec<Vec<Pose>> { (0..n_states).map(|s| tree.poses_at(s)).collect() };
@@ -273,7 +280,8 @@ fn residual(evidence: &Evidence, s: &Sample, t: usize, m: &Pose, gate: f64) -> O
     (r.abs() < gate).then_some((r, n, x))
 }
 
-/// Pivots slide along their axes to beside their part: far from it, tilt and shift would be hard to tell apart.
+/// Pivots slide along their axes to beside their part: far from it, tilt and shift would be hard to
+/// tell apart.
 fn centre_pivots(tree: &mut KinematicTree, members: &[Member]) {
     let poses: Vec<Vec<Pose>> =
         (0..tree.joints.first().map_or(0, |j| j.values.len())).map(|s| tree.poses_at(s)).collect();

@@ -1,4 +1,5 @@
-//! Joints fitted to samples: values by asking all of them, the last digits by Gauss and Newton, and the rival type of a joint.
+//! Joints fitted to samples: values by asking all of them, the last digits by Gauss and Newton, and
+//! the rival type of a joint.
 
 pub mod gauss_newton;
 pub mod rival;

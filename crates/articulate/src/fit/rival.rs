@@ -10,7 +10,8 @@ use hingecast_geom::{Joint, JointKind, KinematicTree};
 /// A hinge that turns less than this in all, radians, moves its part like a slide.
 const SAME_AS_SLIDE_RAD: f64 = 0.02;
 
-/// The tree with joint `j` of the other type, fitted as well as it can be, and how many nats it is behind.
+/// The tree with joint `j` of the other type, fitted as well as it can be, and how many nats it is
+/// behind.
 pub fn rival(
     evidence: &Evidence,
     tree: &KinematicTree,
@@ -38,7 +39,8 @@ pub fn rival(
     (other, nats)
 }
 
-/// Turns a hinge into the slide that moves the part's middle alike, and a slide into a hinge far away.
+/// Turns a hinge into the slide that moves the part's middle alike, and a slide into a hinge far
+/// away.
 fn imitate(joint: &mut Joint, members: &[Member]) -> JointKind {
     let n = members.len().max(1) as f64;
     let centre = members.iter().map(|m| m.sample.point.as_dvec3()).sum::<DVec3>() / n;

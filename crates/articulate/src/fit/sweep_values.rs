@@ -56,8 +56,9 @@ pub struct Question<'a> {
 
 /// Asks every state for the value of a screw.
 ///
-/// `samples`: in the parent's canonical frame as of the source state. `parent_poses[s]`: world at s from that frame.
-/// Values from `range[0]` to `range[1]` are tried in steps that move no sample farther than about `step`, scene units.
+/// `samples`: in the parent's canonical frame as of the source state. `parent_poses[s]`: world at s
+/// from that frame. Values from `range[0]` to `range[1]` are tried in steps that move no sample
+/// farther than about `step`, scene units.
 pub fn sweep_values(
     question: &Question,
     samples: &[Sample],
@@ -119,11 +120,12 @@ pub fn full_range(screw: &Screw, extent: f32) -> [f64; 2] {
     if screw.kind.turns() { [-std::f64::consts::PI, std::f64::consts::PI] } else { [-extent as f64, extent as f64] }
 }
 
-/// Another value must agree this much better with a state than the one that is held, share of the samples.
+/// Another value must agree this much better with a state than the one that is held, share of the
+/// samples.
 const CLEARLY_BETTER: f32 = 0.01;
 
-/// The values of a joint that the states agree with best, for `members` of its child, counted from the first state; the held ones unless
-/// others are clearly better.
+/// The values of a joint that the states agree with best, for `members` of its child, counted from
+/// the first state; the held ones unless others are clearly better.
 pub fn improved_values(
     evidence: &Evidence,
     claims: &Claims,
@@ -144,7 +146,8 @@ pub fn improved_values(
     found.values.iter().map(|v| v - zero).collect()
 }
 
-/// All states asked for the value of a joint, by samples of its child as [`in_parent_frame`] answers them.
+/// All states asked for the value of a joint, by samples of its child as [`in_parent_frame`]
+/// answers them.
 pub fn sweep_joint(question: &Question, joint: &Joint, samples: &[Sample], parent_poses: &[Pose]) -> Sweep {
     let range = full_range(&joint.screw, question.evidence.extent());
     sweep_values(question, samples, parent_poses, &joint.screw, range, question.evidence.lattice.voxel)

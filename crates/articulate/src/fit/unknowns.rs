@@ -6,7 +6,8 @@ use hingecast_geom::pose::quat_from_rotation_vector;
 use hingecast_geom::{JointKind, KinematicTree};
 use nalgebra::DVector;
 
-/// Where a joint's parameters stand in the unknowns: axis 2, pivot 2 (hinges), values from state 1 on.
+/// Where a joint's parameters stand in the unknowns: axis 2, pivot 2 (hinges), values from state 1
+/// on.
 #[derive(Clone, Copy)]
 pub struct Slot {
     /// First unknown of the shape: two tilts, and for hinges two shifts.
@@ -76,7 +77,8 @@ mod tests {
         }
     }
 
-    /// The twists against central differences of where a carried point ends, for every parameter of both joints.
+    /// The twists against central differences of where a carried point ends, for every parameter of
+    /// both joints.
     #[test]
     fn twists_are_the_derivatives_of_the_motion() {
         let tree = chain_tree();

@@ -1,8 +1,9 @@
 //! Where parts meet, pixel by pixel.
 //!
-//! Samples are a voxel apart, and so near to a border of two parts the grid confirms both: the rim of a blade half a voxel above
-//! another's. So the surface there is gathered anew, three times as fine, and the pictures themselves are asked: carried along with
-//! each part into other states, does a point meet what a camera measured there, or does the camera look through it?
+//! Samples are a voxel apart, and so near to a border of two parts the grid confirms both: the rim
+//! of a blade half a voxel above another's. So the surface there is gathered anew, three times as
+//! fine, and the pictures themselves are asked: carried along with each part into other states,
+//! does a point meet what a camera measured there, or does the camera look through it?
 
 use super::labelled::{Labelled, far_off_plane};
 use crate::model::motions::poses_of;
@@ -41,7 +42,8 @@ impl Witness {
         Self { view, camera }
     }
 
-    /// How the four pixels around a world point answer: 1 if one of them measured it, -1 if all look through it, 0 else.
+    /// How the four pixels around a world point answer: 1 if one of them measured it, -1 if all
+    /// look through it, 0 else.
     fn ask(&self, x: Vec3, same: f32) -> i32 {
         let (c, x) = (&self.view.camera, self.camera.to_camera(x));
         let (u, v) = self.camera.uv(x);
@@ -62,8 +64,9 @@ impl Witness {
     }
 }
 
-/// The labelled surface of every state: samples as they are, but along borders finer ones, labelled by the pictures. `labels`: the part of every
-/// point of every state's cloud; `states(s)`: the views of state s, with corrected cameras.
+/// The labelled surface of every state: samples as they are, but along borders finer ones, labelled
+/// by the pictures. `labels`: the part of every point of every state's cloud; `states(s)`: the
+/// views of state s, with corrected cameras.
 pub fn sharpen<E>(
     evidence: &Evidence,
     tree: &KinematicTree,
@@ -128,7 +131,8 @@ impl Here<'_> {
         // That of the sample in whose plane it lies.
         let far = |j: &u32| far_off_plane(x - self.cloud.points[*j as usize], self.cloud.normals[*j as usize]);
         let held = near.iter().min_by(|a, b| far(a).total_cmp(&far(b))).map_or(0, |j| self.labels[*j as usize]);
-        // Only what is contradicted changes hands: a wall that is hidden elsewhere is met nowhere else either.
+        // Only what is contradicted changes hands: a wall that is hidden elsewhere is met nowhere
+        // else either.
         let first = self.ask(x, held);
         if first.through == 0.0 {
             return held;

@@ -1,9 +1,11 @@
-//! Which part a measured sample belongs to: the one under which all states contradict it least and confirm it most.
+//! Which part a measured sample belongs to: the one under which all states contradict it least and
+//! confirm it most.
 //!
-//! A motion can bring a sample onto surface by chance: the underside of an open drawer, turned about the upright axis of a
-//! door, stays in its plane. So support is worth what the states *believe* about the surface that they show there:
-//! cost = 2 contradictions - sum over states of the belief that the surface met belongs to this part. Beliefs are soft-mins of the
-//! costs, smoothed over neighbours of the same state that face alike, and both are computed in turns.
+//! A motion can bring a sample onto surface by chance: the underside of an open drawer, turned
+//! about the upright axis of a door, stays in its plane. So support is worth what the states
+//! *believe* about the surface that they show there: cost = 2 contradictions - sum over states of
+//! the belief that the surface met belongs to this part. Beliefs are soft-mins of the costs,
+//! smoothed over neighbours of the same state that face alike, and both are computed in turns.
 
 use super::beliefs::Beliefs;
 use super::by_likelihood_ratio::{coupled_pairs, divide, restrict_neighbours};
@@ -21,7 +23,8 @@ use rayon::prelude::*;
 
 /// Turns of costs and beliefs.
 const TURNS: usize = 4;
-/// Most that a neighbour speaks against a part where depth is sharp (a contradiction costs 2, a confirmation -1).
+/// Most that a neighbour speaks against a part where depth is sharp (a contradiction costs 2, a
+/// confirmation -1).
 const HEARD: f32 = 4.0;
 
 /// The part of every point of every state's cloud. [state][point]
@@ -80,8 +83,9 @@ pub fn label_clouds(evidence: &Evidence, tree: &KinematicTree, owners: &Owners) 
         labels
     };
     let patched: Vec<Vec<u8>> = (0..n_states).into_par_iter().map(patched).collect();
-    // A patch may reach beyond its owner, over the rim of the case that ends flush with the drawer's back. Where a sample's place in
-    // the other states is what it was before, and not the owner's, it stays what it was.
+    // A patch may reach beyond its owner, over the rim of the case that ends flush with the
+    // drawer's back. Where a sample's place in the other states is what it was before, and not the
+    // owner's, it stays what it was.
     let agreeing = |state: usize, i: usize, part: u8| {
         let v = &verdicts[state][i * n_parts + part as usize];
         let confirms = |t: &usize| {

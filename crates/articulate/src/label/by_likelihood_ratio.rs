@@ -1,7 +1,7 @@
 //! Which of two parts that moved nearly alike a point belongs to.
 //!
-//! The walls of a drawer slide in their own plane and fit the motion of the drawer beside it as well. Its front and its back know, and the rest
-//! belongs to what it hangs on.
+//! The walls of a drawer slide in their own plane and fit the motion of the drawer beside it as
+//! well. Its front and its back know, and the rest belongs to what it hangs on.
 
 use super::smooth::even_out;
 use crate::model::motions::{motions_of, poses_of, state_to_state};
@@ -12,15 +12,16 @@ use crate::score::agreement::agreement;
 use hingecast_geom::KinematicTree;
 use rayon::prelude::*;
 
-/// Parts that never are farther apart than this, voxels, moved nearly alike: twice as far as values are sought beside one between them.
+/// Parts that never are farther apart than this, voxels, moved nearly alike: twice as far as values
+/// are sought beside one between them.
 const ALIKE_VOXELS: f32 = 6.0;
 /// Samples of a part that tell.
 const TELLING_SAMPLES: usize = 50;
 /// A point knows where it belongs if one part explains it better by this.
 const SURE_GAIN: f32 = 0.3;
 
-/// How much better the second of two motions explains a sample, by states where they differ along its normal. `from[k][t]`: world at t from
-/// world at the sample's state.
+/// How much better the second of two motions explains a sample, by states where they differ along
+/// its normal. `from[k][t]`: world at t from world at the sample's state.
 pub fn agreement_gain(evidence: &Evidence, s: &Sample, from: [&[Motion]; 2]) -> f32 {
     let differ = |(a, b): (&Motion, &Motion)| (a.rot * s.normal).dot(b.apply(s.point) - a.apply(s.point)).abs();
     let tells = |t: &usize| *t != s.state && differ((&from[0][*t], &from[1][*t])) > evidence.tolerance;
@@ -28,7 +29,8 @@ pub fn agreement_gain(evidence: &Evidence, s: &Sample, from: [&[Motion]; 2]) -> 
     states.map(|t| agreement(evidence, t, s, &from[1][t]) - agreement(evidence, t, s, &from[0][t])).sum()
 }
 
-/// Of `parts`, the one that each of `points` belongs to, where both moved nearly alike. `neighbours[i]`: points near the i-th.
+/// Of `parts`, the one that each of `points` belongs to, where both moved nearly alike.
+/// `neighbours[i]`: points near the i-th.
 pub fn divide(
     evidence: &Evidence,
     tree: &KinematicTree,

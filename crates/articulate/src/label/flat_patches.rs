@@ -12,9 +12,10 @@ const SOILED_SHARE: f32 = 0.10;
 /// Share of a patch that must be its owner's already: thin lips are contradicted by noise alone.
 const BEGUN_SHARE: f32 = 0.3;
 
-/// A connected flat patch that one part alone can own without contradictions is that part's. The wall of a drawer slides in its own
-/// plane: deep inside it could stand still as well, but where it sticks out it cannot, and it is one wall. `twins`: pairs of parts that
-/// moved nearly alike and count as one here.
+/// A connected flat patch that one part alone can own without contradictions is that part's. The
+/// wall of a drawer slides in its own plane: deep inside it could stand still as well, but where it
+/// sticks out it cannot, and it is one wall. `twins`: pairs of parts that moved nearly alike and
+/// count as one here.
 pub fn whole_patches(
     labels: &mut [u8],
     cloud: &Surface,

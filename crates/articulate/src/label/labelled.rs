@@ -13,8 +13,8 @@ pub struct Labelled {
     pub part: u8,
 }
 
-/// Square of the distance of two points, `gap` apart, that counts three times off the plane of one: two blades lie closer together than their
-/// samples.
+/// Square of the distance of two points, `gap` apart, that counts three times off the plane of one:
+/// two blades lie closer together than their samples.
 pub fn far_off_plane(gap: Vec3, normal: Vec3) -> f32 {
     gap.length_squared() + 8.0 * normal.dot(gap).powi(2)
 }

@@ -1,4 +1,5 @@
-//! Where the faces of a part say that its axis points: nearly everything that people build turns and slides along or square to faces.
+//! Where the faces of a part say that its axis points: nearly everything that people build turns
+//! and slides along or square to faces.
 
 use crate::observe::sample::Sample;
 use glam::DVec3;
@@ -10,9 +11,10 @@ const TELLING_SHARE: f64 = 0.01;
 /// Axes less askew than this are left to Gauss and Newton, radians.
 pub const ASKEW_RAD: f64 = 0.01;
 
-/// The direction that the faces nearly along `axis` and nearly square to it are along and square to, as well as they can be all at
-/// once: the smallest eigenvector of the sum of n n' over the second minus that over the first. In the frame of the parent, whose poses
-/// are `parent`; none where the faces leave it open. `nearly`: radians, from the first time to the last.
+/// The direction that the faces nearly along `axis` and nearly square to it are along and square
+/// to, as well as they can be all at once: the smallest eigenvector of the sum of n n' over the
+/// second minus that over the first. In the frame of the parent, whose poses are `parent`; none
+/// where the faces leave it open. `nearly`: radians, from the first time to the last.
 pub fn along_faces<'a>(
     parent: &[Pose],
     own: impl ExactSizeIterator<Item = &'a Sample> + Clone,

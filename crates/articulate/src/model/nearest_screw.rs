@@ -4,7 +4,8 @@ use glam::DVec3;
 use hingecast_geom::pose::rotation_vector;
 use hingecast_geom::{JointKind, Pose, Screw};
 
-/// Rotation and translation of a pose as the screw of the given kind that is nearest to it, and its value.
+/// Rotation and translation of a pose as the screw of the given kind that is nearest to it, and its
+/// value.
 pub fn nearest_screw(pose: &Pose, kind: JointKind, about: DVec3) -> Option<(Screw, f64)> {
     let w = rotation_vector(pose.rot);
     let shift = pose.apply(about) - about;

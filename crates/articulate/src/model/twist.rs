@@ -1,8 +1,8 @@
 //! How a joint's parameters move what hangs on it.
 //!
-//! Twists of a joint in its parent's frame, with motion T = T(q), axis a through c, and b square to a:
-//! its value: the screw itself; its axis turned about b at c, or shifted along b: e - Ad_T e, since the new motion
-//! is exp(e) T exp(-e).
+//! Twists of a joint in its parent's frame, with motion T = T(q), axis a through c, and b square to
+//! a: its value: the screw itself; its axis turned about b at c, or shifted along b: e - Ad_T e,
+//! since the new motion is exp(e) T exp(-e).
 
 use glam::DVec3;
 use hingecast_geom::{KinematicTree, Pose};
@@ -46,7 +46,8 @@ impl Twist {
     }
 }
 
-/// How far a twist [`Twist::vector`] takes the point `x` along `n`: n . (v + w x X) as a row over (v, w).
+/// How far a twist [`Twist::vector`] takes the point `x` along `n`: n . (v + w x X) as a row over
+/// (v, w).
 pub fn along(n: DVec3, x: DVec3) -> Vector6<f64> {
     let turn = x.cross(n);
     Vector6::new(n.x, n.y, n.z, turn.x, turn.y, turn.z)

@@ -1,8 +1,10 @@
 //! Cameras aligned once more, view by view, to what stands still in all states.
 //!
-//! Within one state, front and back of a box are never in one picture: how thick the box is only the recorded poses know, and with
-//! poses half a degree off it breathes from state to state. A drawer is measured in the pictures of the front, its cabinet mostly in
-//! those of the back. The base is the same in all states, so each view is aligned to the base as all states together measured it.
+//! Within one state, front and back of a box are never in one picture: how thick the box is only
+//! the recorded poses know, and with poses half a degree off it breathes from state to state. A
+//! drawer is measured in the pictures of the front, its cabinet mostly in those of the back. The
+//! base is the same in all states, so each view is aligned to the base as all states together
+//! measured it.
 
 use super::cloud::merge;
 use super::depth_view::DepthView;
@@ -37,7 +39,8 @@ pub fn base(evidence: &Evidence, labels: &[Vec<u8>]) -> Surface {
     Surface::new(cloud.points, cloud.normals)
 }
 
-/// Corrects the cameras of one state's views in place. `labels`: the part of every point of this state's cloud.
+/// Corrects the cameras of one state's views in place. `labels`: the part of every point of this
+/// state's cloud.
 pub fn align(views: &mut [DepthView], evidence: &Evidence, state: usize, labels: &[u8], base: &Surface) {
     let (cloud, voxel) = (&evidence.clouds[state], evidence.lattice.voxel);
     let stands = |x: Vec3| {

@@ -1,8 +1,10 @@
-//! Camera poses that tracking left half a degree off, corrected by the depth that they measured together.
+//! Camera poses that tracking left half a degree off, corrected by the depth that they measured
+//! together.
 //!
-//! Per state: every view's points are aligned to the surface that all views of the state agree on (point to plane), the
-//! surface is gathered anew, and so on. What all views have in common cannot be seen from within, so the mean
-//! correction is taken out again: errors of many cameras average out, errors of one do not.
+//! Per state: every view's points are aligned to the surface that all views of the state agree on
+//! (point to plane), the surface is gathered anew, and so on. What all views have in common cannot
+//! be seen from within, so the mean correction is taken out again: errors of many cameras average
+//! out, errors of one do not.
 
 use super::cloud::merge;
 use super::depth_view::DepthView;
@@ -19,8 +21,8 @@ const ROUNDS: usize = 7;
 const POINTS: usize = 1200;
 /// Fewer points hold no camera.
 const FEW: usize = 60;
-/// Pull towards the recorded pose, share of the pull towards the surface. Front and back of a box are never in one picture:
-/// how thick it is only the recorded poses know.
+/// Pull towards the recorded pose, share of the pull towards the surface. Front and back of a box
+/// are never in one picture: how thick it is only the recorded poses know.
 const TETHER: f64 = 0.01;
 /// Below this share of a voxel the views agree already.
 const SHARP: f32 = 0.04;

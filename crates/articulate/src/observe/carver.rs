@@ -17,8 +17,8 @@ pub(super) struct Carver {
 impl Carver {
     pub(super) fn new(view: &DepthView, margin: f32) -> Self {
         let (w, h) = (view.camera.width, view.camera.height);
-        // Empty up to the depth; forever where only background is; not at all where nothing is known. A pixel with
-        // depth outside the mask is a ragged mask's, not background.
+        // Empty up to the depth; forever where only background is; not at all where nothing is
+        // known. A pixel with depth outside the mask is a ragged mask's, not background.
         let own = |i: usize| match view.class[i] {
             OBJECT => view.depth[i] - margin,
             BACKGROUND => f32::INFINITY,

@@ -16,8 +16,8 @@ pub struct Cloud {
     pub normals: Vec<Vec3>,
 }
 
-/// Gathers the planes of all views of a state into one sample per voxel of edge `voxel` and facing (one of six).
-/// Samples that fewer than `least` pixels support are dropped as stray.
+/// Gathers the planes of all views of a state into one sample per voxel of edge `voxel` and facing
+/// (one of six). Samples that fewer than `least` pixels support are dropped as stray.
 pub fn gather(views: &[DepthView], voxel: f32, stride: usize, least: u32) -> Cloud {
     let planes: Vec<Vec<(Vec3, Vec3, f32)>> = views
         .par_iter()
@@ -43,8 +43,8 @@ pub fn merge(planes: impl Iterator<Item = (Vec3, Vec3, f32)>, voxel: f32, least:
         slot.2 += w;
         slot.3 += 1;
     }
-    // The table's order is not the same in every run. Along Morton's curve, what is asked one after the other lies close together
-    // in every state's grid and tree.
+    // The table's order is not the same in every run. Along Morton's curve, what is asked one after
+    // the other lies close together in every state's grid and tree.
     let lowest = cells.keys().fold(IVec3::MAX, |lo, k| lo.min(k.0.into()));
     let mut cells: Vec<_> = cells.into_iter().collect();
     cells.sort_by_cached_key(|c| (morton(IVec3::from(c.0.0) - lowest), c.0.1));
@@ -63,15 +63,17 @@ pub fn merge(planes: impl Iterator<Item = (Vec3, Vec3, f32)>, voxel: f32, least:
     cloud
 }
 
-/// Samples are flattened where they are off their neighbours' plane by more than this share of a voxel (median).
+/// Samples are flattened where they are off their neighbours' plane by more than this share of a
+/// voxel (median).
 const ROUGH: f32 = 0.05;
 /// Neighbours that hold a sample's plane: within this many voxels, facing alike, so many at most.
 const AROUND: f32 = 1.7;
 const ALIKE: f32 = 0.85;
 const HOLDERS: usize = 24;
 
-/// Noise spreads a surface over two layers of voxels, and whatever is compared with the nearer of two layers seems to lie on it. So
-/// every sample of a rough cloud moves along its normal into the mean plane of its neighbours, by their numbers of pixels.
+/// Noise spreads a surface over two layers of voxels, and whatever is compared with the nearer of
+/// two layers seems to lie on it. So every sample of a rough cloud moves along its normal into the
+/// mean plane of its neighbours, by their numbers of pixels.
 fn flatten(cloud: &mut Cloud, pixels: &[f32], voxel: f32) {
     for _ in 0..2 {
         let tree = PointTree::new(&cloud.points);

@@ -1,8 +1,8 @@
 //! What one camera measured, and the planes that its depth lies on.
 //!
-//! Normals come from planes fitted to inverse depth: over a plane n . X = 1 in the camera's frame, 1/z is affine in the
-//! ray's slopes u = x/z, v = y/z: 1/z = n . (u, v, 1). So a plane's normal is exact where the depth is, whatever
-//! the slant. The window grows with the measured noise.
+//! Normals come from planes fitted to inverse depth: over a plane n . X = 1 in the camera's frame,
+//! 1/z is affine in the ray's slopes u = x/z, v = y/z: 1/z = n . (u, v, 1). So a plane's normal is
+//! exact where the depth is, whatever the slant. The window grows with the measured noise.
 
 use super::robust::deviation;
 use glam::Vec3;
@@ -34,8 +34,8 @@ const BENT: f32 = 0.02;
 const GRAZING: f32 = 0.2;
 
 impl DepthView {
-    /// A view of the object alone: whatever has depth is the object, whatever has none (0) is background that the camera looked
-    /// through. `depth`: z, scene units. (h, w)
+    /// A view of the object alone: whatever has depth is the object, whatever has none (0) is
+    /// background that the camera looked through. `depth`: z, scene units. (h, w)
     pub fn new(camera: Camera, depth: Vec<f32>) -> Self {
         let class = depth.iter().map(|z| if *z > 0.0 { OBJECT } else { BACKGROUND }).collect();
         Self { camera, depth, class }
@@ -73,8 +73,8 @@ impl DepthView {
             .map_or(4, |(r, _)| r)
     }
 
-    /// Calls `emit(point, normal, weight)` in the world frame for every `stride`-th pixel with a plane. The weight is 1 where the window is one,
-    /// and less where it bends over an edge.
+    /// Calls `emit(point, normal, weight)` in the world frame for every `stride`-th pixel with a
+    /// plane. The weight is 1 where the window is one, and less where it bends over an edge.
     pub fn planes(&self, stride: usize, emit: &mut dyn FnMut(Vec3, Vec3, f32)) {
         let (w, h, c) = (self.camera.width, self.camera.height, &self.camera);
         let world_from_camera = c.camera_from_world.inverse();

@@ -21,7 +21,8 @@ const NEIGHBOURS: usize = 8;
 
 /// Surfaces face the same way where the cosine between their normals is at least this: 32 deg.
 const FACES_ALIKE: f32 = 0.85;
-/// The nearest sample of a surface at a place is at most this many voxels away: samples are a voxel apart.
+/// The nearest sample of a surface at a place is at most this many voxels away: samples are a voxel
+/// apart.
 const SAME_VOXEL: f32 = 1.1;
 /// Noise below this share of a voxel: the states' frames agree already.
 const SHARP: f32 = 0.05;
@@ -43,7 +44,8 @@ pub struct Evidence {
 }
 
 impl Evidence {
-    /// `states(s)` answers the views of state s; they are dropped before the next state is asked for.
+    /// `states(s)` answers the views of state s; they are dropped before the next state is asked
+    /// for.
     pub fn gather<E>(
         n_states: usize,
         lattice: Lattice,
@@ -93,7 +95,8 @@ impl Evidence {
         self.tolerance > 4.0 * SHARP * self.lattice.voxel
     }
 
-    /// Median distance between a sample and the plane that another state measured where the sample stands still.
+    /// Median distance between a sample and the plane that another state measured where the sample
+    /// stands still.
     fn noise(&self) -> f32 {
         let mut off: Vec<f32> = (0..self.samples.len())
             .into_par_iter()
@@ -117,7 +120,8 @@ impl Evidence {
         (squared <= reach * reach && cloud.normals[i].dot(n) >= FACES_ALIKE).then_some(i)
     }
 
-    /// Height of `x` above the plane of state t's sample nearest to it, if that lies within a voxel and faces the same way.
+    /// Height of `x` above the plane of state t's sample nearest to it, if that lies within a voxel
+    /// and faces the same way.
     pub fn height(&self, t: usize, x: Vec3, n: Vec3) -> Option<f32> {
         let (cloud, i) = (&self.clouds[t], self.surface_at(t, x, n, SAME_VOXEL * self.lattice.voxel)?);
         Some(cloud.normals[i].dot(x - cloud.points[i]))
@@ -128,12 +132,14 @@ impl Evidence {
         self.height(t, x, n).is_some_and(|d| d.abs() < self.tolerance)
     }
 
-    /// How near `x` is to surface of state t that faces along `n`: 1 on it, half at the tolerance, 0 where there is none.
+    /// How near `x` is to surface of state t that faces along `n`: 1 on it, half at the tolerance,
+    /// 0 where there is none.
     pub fn nearness(&self, t: usize, x: Vec3, n: Vec3) -> f32 {
         self.height(t, x, n).map_or(0.0, |d| 1.0 / (1.0 + (d / self.tolerance).powi(2)))
     }
 
-    /// The same with what each state measured moved by its correction (its samples; the grid is too coarse to care).
+    /// The same with what each state measured moved by its correction (its samples; the grid is too
+    /// coarse to care).
     pub fn in_frames(mut self, corrections: &[Pose]) -> Self {
         let motions: Vec<Motion> = corrections.iter().map(|c| Motion::from(*c)).collect();
         for s in &mut self.samples {

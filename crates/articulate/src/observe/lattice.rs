@@ -43,8 +43,8 @@ impl Lattice {
         inside.then(|| ((c.z * self.size.y + c.y) * self.size.x + c.x) as usize)
     }
 
-    /// Index of the cell that holds `x`. Asked hundreds of millions of times, so it rounds by cutting off decimals: what is inside
-    /// is not negative.
+    /// Index of the cell that holds `x`. Asked hundreds of millions of times, so it rounds by
+    /// cutting off decimals: what is inside is not negative.
     #[inline]
     pub fn index(&self, x: Vec3) -> Option<usize> {
         let t = (x - self.lo) * self.per_voxel;

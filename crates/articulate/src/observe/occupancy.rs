@@ -1,4 +1,5 @@
-//! A state's space as a grid: where surface was measured (and which way it faces), what cameras saw empty, what nobody saw.
+//! A state's space as a grid: where surface was measured (and which way it faces), what cameras saw
+//! empty, what nobody saw.
 
 use super::carver::Carver;
 use super::cloud::Cloud;

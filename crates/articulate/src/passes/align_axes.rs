@@ -1,8 +1,9 @@
-//! Axes along their part's own faces, or square to them, as in nearly everything that people build, where the recording does not
-//! contradict that.
+//! Axes along their part's own faces, or square to them, as in nearly everything that people build,
+//! where the recording does not contradict that.
 //!
-//! A closed drawer shows its front alone, and in two states nothing else tells whether it rises by a degree on its way. A closed
-//! door's front may turn in its own plane by as much without leaving it.
+//! A closed drawer shows its front alone, and in two states nothing else tells whether it rises by
+//! a degree on its way. A closed door's front may turn in its own plane by as much without leaving
+//! it.
 
 use super::pass::Round;
 use crate::config::MANY_STATES;
@@ -15,20 +16,22 @@ use crate::observe::evidence::Evidence;
 use crate::score::compare::{bic_of_two_unknowns, nats_behind};
 use hingecast_geom::{KinematicTree, Pose};
 
-/// Faces within this angle of the axis, or of square to it, radians, say where it points; first roughly, then without those that are
-/// curved or meant otherwise.
+/// Faces within this angle of the axis, or of square to it, radians, say where it points; first
+/// roughly, then without those that are curved or meant otherwise.
 const NEARLY_RAD: [f64; 2] = [0.15, 0.04];
 /// Faces do not know their directions better than this, radians.
 const KNOWN_RAD: f64 = 0.001;
-/// With many states, an axis that is nearly along the faces stays unless along them it explains the recording better by this many nats.
+/// With many states, an axis that is nearly along the faces stays unless along them it explains the
+/// recording better by this many nats.
 const CLEARLY_NATS: f64 = 1.0;
 /// Axes go along their parts' faces, where the recording does not contradict that.
 pub fn align_axes(round: &Round, estimate: &mut Estimate) {
     straighten(round.evidence, &mut estimate.tree, &estimate.owners, round.seed);
 }
 
-/// Turns axes to where their part's faces say, one joint after another. With few states, and where the axis is far from there, they may
-/// explain the recording a little worse: two unknowns less are worth their share of evidence.
+/// Turns axes to where their part's faces say, one joint after another. With few states, and where
+/// the axis is far from there, they may explain the recording a little worse: two unknowns less are
+/// worth their share of evidence.
 fn straighten(evidence: &Evidence, tree: &mut KinematicTree, owners: &Owners, seed: u64) {
     let voxel = evidence.lattice.voxel as f64;
     let fit = Settings { gates: [1.0 * voxel, 0.6 * voxel], rounds: 4, partners: 6 };

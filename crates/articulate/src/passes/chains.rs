@@ -1,4 +1,5 @@
-//! What hangs on what: parts that need not hang on another moving part, and chains whose links may change places.
+//! What hangs on what: parts that need not hang on another moving part, and chains whose links may
+//! change places.
 
 use super::pass::{Round, judge_all, prune_parts};
 use crate::model::estimate::Estimate;
@@ -33,8 +34,9 @@ pub fn shorten_chains(round: &Round, estimate: &mut Estimate) {
 
 /// Whether a hinge and a slide change places.
 ///
-/// A turn about an axis and a slide along it commute, so the part at their end does not know which of them comes first (the seat of a
-/// swivel chair); only what takes part in one of them does. The order that explains more stays.
+/// A turn about an axis and a slide along it commute, so the part at their end does not know which
+/// of them comes first (the seat of a swivel chair); only what takes part in one of them does. The
+/// order that explains more stays.
 fn swap(evidence: &Evidence, tree: &mut KinematicTree, verdicts: &mut [Vec<Verdict>]) -> bool {
     // Under the part that no state contradicts and most show.
     let shown = |verdicts: &[Vec<Verdict>], i: usize| {
@@ -71,13 +73,15 @@ fn swap(evidence: &Evidence, tree: &mut KinematicTree, verdicts: &mut [Vec<Verdi
 /// Samples may be off by this many voxels when a part is hung on its grandparent.
 const ALIKE_VOXELS: f64 = 1.0;
 
-/// Hangs parts on their grandparents where one screw says as much there: of two drawers that slide alike, neither carries the other.
+/// Hangs parts on their grandparents where one screw says as much there: of two drawers that slide
+/// alike, neither carries the other.
 fn simplify(evidence: &Evidence, tree: &mut KinematicTree, owners: &Owners) {
     let n_states = evidence.n_states();
     for j in 0..tree.joints.len() {
         while let Some(up) = tree.joints.iter().find(|up| up.child == tree.joints[j].parent).cloned() {
             let joint = &tree.joints[j];
-            // Motion of the part in its grandparent's frame, and where its samples are in the canonical frame.
+            // Motion of the part in its grandparent's frame, and where its samples are in the
+            // canonical frame.
             let motions: Vec<Pose> =
                 (0..n_states).map(|s| up.screw.motion(up.values[s]) * joint.screw.motion(joint.values[s])).collect();
             let poses = poses_of(tree, joint.child, n_states);
@@ -96,7 +100,8 @@ fn simplify(evidence: &Evidence, tree: &mut KinematicTree, owners: &Owners) {
     }
 }
 
-/// The screw and values that move `points` as `motions` (the first is none) do, to within `tolerance`.
+/// The screw and values that move `points` as `motions` (the first is none) do, to within
+/// `tolerance`.
 fn one_screw(motions: &[Pose], points: &[DVec3], kind: JointKind, tolerance: f64) -> Option<(Screw, Vec<f64>)> {
     let centre = points.iter().sum::<DVec3>() / points.len().max(1) as f64;
     let size = |p: &Pose| p.angle() + (p.apply(centre) - centre).length();

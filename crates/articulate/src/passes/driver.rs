@@ -23,7 +23,8 @@ pub struct PassRecord {
     pub skipped: bool,
     /// Parts afterwards, the base included.
     pub parts: usize,
-    /// How well the tree explains what moved, before and after, nats by a few hundred samples; higher is better.
+    /// How well the tree explains what moved, before and after, nats by a few hundred samples;
+    /// higher is better.
     pub nats: [f64; 2],
     /// Wall time.
     pub secs: f64,
@@ -32,7 +33,8 @@ pub struct PassRecord {
 /// Samples that the nats of a [`PassRecord`] are counted on.
 const TRACED_SAMPLES: usize = 300;
 
-/// Runs all passes but those whose names are in `skip`. Answers the evidence in the states' frames as they are believed in the end.
+/// Runs all passes but those whose names are in `skip`. Answers the evidence in the states' frames
+/// as they are believed in the end.
 pub fn settle(
     evidence: Evidence,
     found: Discovery,

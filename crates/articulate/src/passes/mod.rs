@@ -57,7 +57,8 @@ const fn needed(name: &'static str, run: fn(&Round, &mut Estimate)) -> Pass {
     Pass { name, run, optional: false }
 }
 
-/// Every pass in order, each with the round that it belongs to; [`FIRST`] counts as round 0 and [`LAST`] as the one after the rounds.
+/// Every pass in order, each with the round that it belongs to; [`FIRST`] counts as round 0 and
+/// [`LAST`] as the one after the rounds.
 pub fn schedule() -> impl Iterator<Item = (usize, &'static Pass)> {
     let first = FIRST.iter().map(|p| (0, p));
     let rounds = (0..ROUNDS).flat_map(|round| ROUND.iter().map(move |p| (round, p)));

@@ -1,4 +1,5 @@
-//! What all passes share: what they are given, and the two steps that keep labels and verdicts up to date.
+//! What all passes share: what they are given, and the two steps that keep labels and verdicts up
+//! to date.
 
 use crate::label::by_verdicts::label;
 use crate::model::estimate::Estimate;
@@ -45,7 +46,8 @@ pub fn label_by_verdicts(round: &Round, estimate: &mut Estimate) {
     estimate.owners.labels = label(round.evidence, &estimate.verdicts);
 }
 
-/// Drops parts that the others make superfluous: those without children that explain less than they cost. The verdicts follow.
+/// Drops parts that the others make superfluous: those without children that explain less than they
+/// cost. The verdicts follow.
 pub fn prune_parts(estimate: &mut Estimate) {
     let Estimate { tree, verdicts, cost, owners, .. } = estimate;
     loop {

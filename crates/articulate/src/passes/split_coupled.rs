@@ -1,7 +1,9 @@
-//! Parts that moved nearly alike: two drawers open to within a voxel or two of each other in every state.
+//! Parts that moved nearly alike: two drawers open to within a voxel or two of each other in every
+//! state.
 //!
-//! The grid takes them for one thing. Measured within the noise, what one says about a state contradicts the other. Where the samples of a
-//! part want two values of its joint ([`super::two_values`]) and that explains the recording clearly better, the part is two.
+//! The grid takes them for one thing. Measured within the noise, what one says about a state
+//! contradicts the other. Where the samples of a part want two values of its joint
+//! ([`super::two_values`]) and that explains the recording clearly better, the part is two.
 
 use super::align_axes::align_axes;
 use super::pass::{Round, judge_all};
@@ -23,7 +25,8 @@ use rayon::prelude::*;
 
 /// Each of two parts has at least this share of the samples.
 const LEAST_SHARE: f64 = 0.1;
-/// Two parts must explain the recording better by this many nats, and by this share of what the one explains.
+/// Two parts must explain the recording better by this many nats, and by this share of what the one
+/// explains.
 const BETTER_NATS: f64 = 15.0;
 const BETTER_SHARE: f64 = 0.1;
 /// A part that explains fewer nats beside two new ones than this goes.
@@ -64,8 +67,8 @@ fn split(evidence: &Evidence, tree: &mut KinematicTree, owners: &mut Owners, sti
     any
 }
 
-/// The tree without what hangs on the part of joint `j`, whose samples become that part's, and where that joint is then. A second part, found
-/// as if it hung on the first, is no third.
+/// The tree without what hangs on the part of joint `j`, whose samples become that part's, and
+/// where that joint is then. A second part, found as if it hung on the first, is no third.
 fn without_children(tree: &KinematicTree, owners: &Owners, j: usize) -> (KinematicTree, Owners, usize) {
     let (mut out, mut child) = (tree.clone(), tree.joints[j].child);
     let mut own = owners.clone();
@@ -81,7 +84,8 @@ fn without_children(tree: &KinematicTree, owners: &Owners, j: usize) -> (Kinemat
     (out, own, at)
 }
 
-/// The tree without a part that carries no other; `goes(i)`: the part, as counted before, that its i-th sample goes to.
+/// The tree without a part that carries no other; `goes(i)`: the part, as counted before, that its
+/// i-th sample goes to.
 fn drop_part(
     tree: &KinematicTree,
     owners: &mut Owners,
@@ -98,8 +102,8 @@ fn drop_part(
     without(tree, part)
 }
 
-/// The tree with the part of joint `j` in two, with these values, and all labels; none unless that explains the recording clearly better
-/// than the `held` nats of before.
+/// The tree with the part of joint `j` in two, with these values, and all labels; none unless that
+/// explains the recording clearly better than the `held` nats of before.
 fn split_in_two(
     evidence: &Evidence,
     tree: &KinematicTree,
@@ -140,7 +144,8 @@ fn split_in_two(
     Some((out, all))
 }
 
-/// Drops parts that the others make superfluous; their samples go to whatever explains them best. Whether any was dropped.
+/// Drops parts that the others make superfluous; their samples go to whatever explains them best.
+/// Whether any was dropped.
 fn superfluous(evidence: &Evidence, tree: &mut KinematicTree, owners: &mut Owners, likelihood: &Likelihood) -> bool {
     let mut any = false;
     loop {

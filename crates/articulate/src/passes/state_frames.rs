@@ -15,7 +15,8 @@ use rayon::prelude::*;
 const HOLDING: usize = 3000;
 /// Fewer samples of the base than this do not hold a state's frame.
 const FEW: usize = 150;
-/// Pull towards the state's own frame in directions that its base leaves open, share of the pull towards the surface.
+/// Pull towards the state's own frame in directions that its base leaves open, share of the pull
+/// towards the surface.
 const TETHER: f64 = 0.003;
 
 /// Brings the states' frames together where depth or poses are noisy.
@@ -29,7 +30,8 @@ pub fn align_states(round: &Round, estimate: &mut Estimate) {
     }
 }
 
-/// Corrections that bring the base of every state onto the base of all others; their mean is nothing.
+/// Corrections that bring the base of every state onto the base of all others; their mean is
+/// nothing.
 fn frames(evidence: &Evidence, labels: &[u8], seed: u64) -> Vec<Pose> {
     let n_states = evidence.n_states();
     let mut rng = fastrand::Rng::with_seed(seed);

@@ -1,7 +1,8 @@
 //! Axes that were found while the other parts were not known.
 //!
-//! The fronts of two equal drawers side by side, open nearly as far, are one long board as long as neither is known: a slide 17 deg askew
-//! carries the one onto the other, a voxel off. When all parts are found, each axis is tried along its part's faces and along other axes.
+//! The fronts of two equal drawers side by side, open nearly as far, are one long board as long as
+//! neither is known: a slide 17 deg askew carries the one onto the other, a voxel off. When all
+//! parts are found, each axis is tried along its part's faces and along other axes.
 
 use super::pass::{Round, relabel};
 use super::value_search::values_beside;
@@ -18,7 +19,8 @@ use crate::score::verdict::Verdict;
 use glam::DVec3;
 use hingecast_geom::KinematicTree;
 
-/// Other directions are sought within this angle, radians; faces within these then say it better. See [`along_faces`].
+/// Other directions are sought within this angle, radians; faces within these then say it better.
+/// See [`along_faces`].
 const WITHIN_RAD: [f64; 3] = [0.6, 0.15, 0.04];
 /// Another direction must explain the recording better by this many nats.
 const BETTER_NATS: f64 = 3.0;
@@ -30,8 +32,8 @@ pub fn turn_axes(round: &Round, estimate: &mut Estimate) {
     }
 }
 
-/// Turns axes to where faces or other axes point, where that explains the recording better. `still`: the verdicts if nothing moved.
-/// Whether any was turned.
+/// Turns axes to where faces or other axes point, where that explains the recording better.
+/// `still`: the verdicts if nothing moved. Whether any was turned.
 fn turn(evidence: &Evidence, tree: &mut KinematicTree, owners: &Owners, still: &[Verdict], seed: u64) -> bool {
     let likelihood = Likelihood::new(still, seed);
     let (mut any, mut held) = (false, None);

@@ -20,7 +20,8 @@ const PARTNERS: usize = 4;
 const PREFERENCE: f32 = 0.3;
 /// Samples that prefer either value, at least.
 const LEAST_SAMPLES: usize = 12;
-/// Two values must explain this share of the samples of two states more than one does, or nothing else is asked.
+/// Two values must explain this share of the samples of two states more than one does, or nothing
+/// else is asked.
 const LEAST_GAIN: f32 = 0.05;
 /// Turns of who belongs to which half, and their values.
 const TURNS: usize = 4;
@@ -45,7 +46,8 @@ struct Split {
     offsets: [f64; 2],
 }
 
-/// The values of joint `j` that either half of its part wants, from 0 in the first state, if there seem to be two.
+/// The values of joint `j` that either half of its part wants, from 0 in the first state, if there
+/// seem to be two.
 pub fn two_values(
     evidence: &Evidence,
     tree: &KinematicTree,
@@ -159,7 +161,8 @@ impl Part<'_> {
         })
     }
 
-    /// The value near one of two that state `t` agrees with best; the first unless another is better, or if the state hides the part.
+    /// The value near one of two that state `t` agrees with best; the first unless another is
+    /// better, or if the state hides the part.
     fn best(&self, t: usize, held: [f64; 2], samples: &[Sample]) -> f64 {
         if self.shown >> t & 1 == 0 {
             return held[0];

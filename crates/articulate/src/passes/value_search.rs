@@ -1,8 +1,9 @@
 //! Values that are a voxel or two beside the right one.
 //!
-//! On the grid a front meets surface a voxel and a half in front of itself and behind it, and beside it an equal front may stand there.
-//! Gauss-Newton takes such a value for what it is near to. So every state is asked by distance for the values around the one that
-//! is held, by samples that other states saw: those of its own stand where they are, whatever the value.
+//! On the grid a front meets surface a voxel and a half in front of itself and behind it, and
+//! beside it an equal front may stand there. Gauss-Newton takes such a value for what it is near
+//! to. So every state is asked by distance for the values around the one that is held, by samples
+//! that other states saw: those of its own stand where they are, whatever the value.
 
 use super::pass::Round;
 use crate::model::estimate::Estimate;
@@ -52,7 +53,8 @@ pub fn values_beside(evidence: &Evidence, tree: &mut KinematicTree, owners: &Own
     }
 }
 
-/// Changes of a value that move most `samples` (in the screw's frame) by up to three voxels, without none.
+/// Changes of a value that move most `samples` (in the screw's frame) by up to three voxels,
+/// without none.
 pub fn offsets(evidence: &Evidence, screw: &Screw, samples: &[Sample]) -> Vec<f64> {
     let mut reach: Vec<f64> = samples.iter().map(|s| screw.distance(s.point.as_dvec3())).collect();
     reach.sort_by(f64::total_cmp);

@@ -1,8 +1,9 @@
 //! States that do not show a part: a rack behind a closed door.
 //!
-//! Asked for the value there, the states answer all the same: the front of the rack fits the inside of any board. What tells is surface
-//! that no other part explains. Where nearly none of it is the part's, the states are asked once more with that surface alone, and
-//! where that finds nothing, the value is that of the nearest state that shows the part, where nothing of it would be seen.
+//! Asked for the value there, the states answer all the same: the front of the rack fits the inside
+//! of any board. What tells is surface that no other part explains. Where nearly none of it is the
+//! part's, the states are asked once more with that surface alone, and where that finds nothing,
+//! the value is that of the nearest state that shows the part, where nothing of it would be seen.
 
 use super::pass::{Round, relabel};
 use crate::fit::sweep_values::{Question, Worth, grid_agreement, sweep_joint};
@@ -14,7 +15,8 @@ use crate::score::claims::Claims;
 use crate::score::verdict::Verdict;
 use hingecast_geom::KinematicTree;
 
-/// A state with less than this share of the surface of its own that a part has in the state that shows most of it may not show it.
+/// A state with less than this share of the surface of its own that a part has in the state that
+/// shows most of it may not show it.
 const WEAK_SHARE: f64 = 0.1;
 /// Share of a part's samples that must meet surface of its own where it is shown.
 const SEEN_SHARE: f32 = 0.02;
@@ -23,7 +25,8 @@ const ENTERED_SHARE: f32 = 0.05;
 /// ... and fewer than this lie near any surface that faces alike: boards of what hides it.
 const NEAR_SHARE: f32 = 0.3;
 
-/// Finds the states that do not show a part, and lets its value there be that of a state which does.
+/// Finds the states that do not show a part, and lets its value there be that of a state which
+/// does.
 pub fn find_hidden(round: &Round, estimate: &mut Estimate) {
     let Estimate { tree, owners, verdicts, .. } = estimate;
     let hidden = hidden(round.evidence, tree, &owners.labels, verdicts, round.seed);
@@ -42,8 +45,9 @@ pub fn hold_hidden(_: &Round, estimate: &mut Estimate) {
     hold(&mut estimate.tree, &estimate.hidden);
 }
 
-/// Of every joint, the states that do not show its part, each with the nearest state whose value may hold there as well. Corrects values:
-/// those that only surface of other parts spoke for, and those of hidden parts.
+/// Of every joint, the states that do not show its part, each with the nearest state whose value
+/// may hold there as well. Corrects values: those that only surface of other parts spoke for, and
+/// those of hidden parts.
 fn hidden(
     evidence: &Evidence,
     tree: &mut KinematicTree,

@@ -1,9 +1,11 @@
-//! What pictures say about the poses of parts: the gaussians, rendered where a guess puts them, against what was seen.
+//! What pictures say about the poses of parts: the gaussians, rendered where a guess puts them,
+//! against what was seen.
 //!
-//! Cost: sum over pixels and channels of rho(render - picture), rho(r) = r^2 / (1 + r^2 / s^2) (Geman and McClure). Its gradient by the
-//! parts' poses is the engine's; its Hessian is that of Gauss and Newton with the flow of the picture: a twist (v, w) of a part moves
-//! the point X of its pixel, and the pixel's colour changes by -grad(I) . dpi/dX (v + w x X). That neglects occlusion, so steps are longer or
-//! shorter than they should be, but they go down.
+//! Cost: sum over pixels and channels of rho(render - picture), rho(r) = r^2 / (1 + r^2 / s^2)
+//! (Geman and McClure). Its gradient by the parts' poses is the engine's; its Hessian is that of
+//! Gauss and Newton with the flow of the picture: a twist (v, w) of a part moves the point X of its
+//! pixel, and the pixel's colour changes by -grad(I) . dpi/dX (v + w x X). That neglects occlusion,
+//! so steps are longer or shorter than they should be, but they go down.
 
 use crate::model::twist::along;
 use glam::DVec3;
@@ -11,10 +13,12 @@ use hingecast_geom::Camera;
 use hingecast_splat::{Engine, Gradients, PixelGradients, Render, RenderOptions, SplatError, Target};
 use nalgebra::{Matrix2, Matrix2x6, Matrix6, Vector2, Vector6};
 
-/// Differences of colour (0..1) beyond this hardly pull: highlights, shadows, what no gaussian shows.
+/// Differences of colour (0..1) beyond this hardly pull: highlights, shadows, what no gaussian
+/// shows.
 const ROBUST: f32 = 0.1;
 
-/// What pictures say about the pose of every part: gradient and Hessian by its twist (v, w), about the world's origin.
+/// What pictures say about the pose of every part: gradient and Hessian by its twist (v, w), about
+/// the world's origin.
 pub struct ByPart {
     /// By each part's twist.
     pub gradient: Vec<Vector6<f64>>,

@@ -1,5 +1,5 @@
-//! How sharply the depth of a state holds the pose of a part: the normal matrix of point to plane, r = n . (X - y), by a twist of
-//! the part (v, w) in the world frame, dr = n . v + (X x n) . w.
+//! How sharply the depth of a state holds the pose of a part: the normal matrix of point to plane,
+//! r = n . (X - y), by a twist of the part (v, w) in the world frame, dr = n . v + (X x n) . w.
 
 use crate::model::estimate::Estimate;
 use crate::model::twist::along;

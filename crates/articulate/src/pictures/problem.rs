@@ -1,11 +1,13 @@
-//! Joints and states' frames by the pictures: what the gaussians, put where the tree says, should look like in every view, against
-//! what it shows; together with what the depth says about the same poses.
+//! Joints and states' frames by the pictures: what the gaussians, put where the tree says, should
+//! look like in every view, against what it shows; together with what the depth says about the same
+//! poses.
 //!
-//! Cost in nats: that of the pictures (`pictures`), plus half the squared twist that takes every part from where the depth has it, by
-//! [`Information`](super::information::Information).
+//! Cost in nats: that of the pictures (`pictures`), plus half the squared twist that takes every
+//! part from where the depth has it, by [`Information`](super::information::Information).
 //!
-//! Unknowns: axes, pivots and values of all joints; the values of the first state too, since the gaussians stand where all states together
-//! put them and not quite where the first had them; and the frame of every state, which is eliminated (Schur).
+//! Unknowns: axes, pivots and values of all joints; the values of the first state too, since the
+//! gaussians stand where all states together put them and not quite where the first had them; and
+//! the frame of every state, which is eliminated (Schur).
 
 use super::gradient::ByPart;
 use crate::fit::unknowns::{Slot, update};
@@ -125,7 +127,8 @@ impl Problem<'_> {
         out
     }
 
-    /// The unknowns that move a part in a state, each with the twist that it causes before the state's frame moves it on.
+    /// The unknowns that move a part in a state, each with the twist that it causes before the
+    /// state's frame moves it on.
     fn columns(&self, tree: &KinematicTree, state: usize, part: usize, poses: &[Pose]) -> Vec<(usize, Twist)> {
         let mut out = Vec::new();
         for j in tree.ancestry(part) {

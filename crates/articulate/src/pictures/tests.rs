@@ -39,7 +39,8 @@ fn engine(n: usize, opacity: f32) -> Engine {
     engine
 }
 
-/// Pictures of the true object; those of the second state by cameras that take the world to be at `rig`.
+/// Pictures of the true object; those of the second state by cameras that take the world to be at
+/// `rig`.
 fn shots(engine: &mut Engine, rig: &Pose) -> Vec<Shot> {
     let truth = tree(0.1, 0.0, TRUE_VALUES);
     let mut out = Vec::new();
@@ -131,7 +132,8 @@ fn gradients_agree_with_central_differences() {
     }
 }
 
-/// Depth that is wrong and knows little: the pictures find the joint, its values and the frame that is off.
+/// Depth that is wrong and knows little: the pictures find the joint, its values and the frame that
+/// is off.
 #[test]
 fn pictures_find_a_joint_and_a_frame() {
     let mut engine = engine(600, 4.0);

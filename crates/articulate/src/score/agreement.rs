@@ -1,7 +1,8 @@
 //! How well the states agree that a sample moved so, finer than the grid.
 //!
-//! One state's word on one sample is 1 / (1 + (h / tolerance)^2), h the height over the surface that it measured where the motion puts the
-//! sample, 0 where nothing is known, and [`EMPTY_COST`] below it where it was seen empty.
+//! One state's word on one sample is 1 / (1 + (h / tolerance)^2), h the height over the surface
+//! that it measured where the motion puts the sample, 0 where nothing is known, and [`EMPTY_COST`]
+//! below it where it was seen empty.
 
 use crate::observe::evidence::Evidence;
 use crate::observe::occupancy::Answer;
@@ -10,7 +11,8 @@ use crate::observe::sample::{Motion, Sample};
 /// What entering space that was seen empty costs against meeting one surface.
 pub const EMPTY_COST: f32 = 1.5;
 
-/// What state t says about a sample there: 1 on surface that faces the same way, -1.5 where it was seen empty.
+/// What state t says about a sample there: 1 on surface that faces the same way, -1.5 where it was
+/// seen empty.
 pub fn agreement(evidence: &Evidence, t: usize, s: &Sample, m: &Motion) -> f32 {
     let (x, normal) = (m.apply(s.point), m.rot * s.normal);
     if matches!(evidence.spaces[t].ask(x, normal), Answer::Free) {
@@ -20,7 +22,8 @@ pub fn agreement(evidence: &Evidence, t: usize, s: &Sample, m: &Motion) -> f32 {
     }
 }
 
-/// What all other states say about a sample together; `from[t]`: world at t from world at its state.
+/// What all other states say about a sample together; `from[t]`: world at t from world at its
+/// state.
 pub fn total_agreement(evidence: &Evidence, s: &Sample, from: &[Motion]) -> f32 {
     (0..from.len()).filter(|t| *t != s.state).map(|t| agreement(evidence, t, s, &from[t])).sum()
 }

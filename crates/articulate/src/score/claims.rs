@@ -1,7 +1,8 @@
 //! Which measured surface known parts explain: two bits for every cell of every state's lattice.
 //!
-//! A search for one more part, or for the value of one joint, asks about surface that nothing else explains. What is already explained is
-//! no property of the recording, so it stands here and not in the evidence: a value, made for one question and passed to whoever asks it.
+//! A search for one more part, or for the value of one joint, asks about surface that nothing else
+//! explains. What is already explained is no property of the recording, so it stands here and not
+//! in the evidence: a value, made for one question and passed to whoever asks it.
 
 use crate::model::motions::{poses_of, state_to_state};
 use crate::observe::evidence::Evidence;
@@ -31,8 +32,9 @@ impl Claims {
         Self::default()
     }
 
-    /// Claims of parts with these poses (world from canonical) [part][state]: on cells around surface that one of them explains (never
-    /// contradicted, and confirmed by half of the states), and on those that one could explain (never contradicted).
+    /// Claims of parts with these poses (world from canonical) [part][state]: on cells around
+    /// surface that one of them explains (never contradicted, and confirmed by half of the states),
+    /// and on those that one could explain (never contradicted).
     pub fn of_parts(evidence: &Evidence, parts: &[Vec<Pose>]) -> Self {
         let n = evidence.n_states();
         let between: Vec<_> = parts.iter().map(|p| state_to_state(p)).collect();

@@ -48,7 +48,8 @@ impl Met {
 
 /// Most samples that judge.
 const MOST_MEMBERS: usize = 4000;
-/// What a removed contradiction counts if a surface was only met in the grid, and if nobody saw where the sample went.
+/// What a removed contradiction counts if a surface was only met in the grid, and if nobody saw
+/// where the sample went.
 const MET_LOOSELY: f64 = 0.3;
 const UNSEEN_SHARE: f64 = 0.1;
 /// What it counts if the surface met could as well belong to a known part.
@@ -57,7 +58,8 @@ const POSSIBLE_SHARE: f64 = 0.8;
 const MEASURED_STATES: usize = 4;
 
 impl Consensus {
-    /// `open`: samples that every known part contradicts; `verdicts`: of the known parts [part][sample].
+    /// `open`: samples that every known part contradicts; `verdicts`: of the known parts
+    /// [part][sample].
     pub fn new(evidence: &Evidence, open: &[usize], verdicts: &[Vec<Verdict>], seed: u64) -> Self {
         let mut chosen = open.to_vec();
         fastrand::Rng::with_seed(seed).shuffle(&mut chosen);
@@ -70,14 +72,15 @@ impl Consensus {
         }
     }
 
-    /// Contradictions that a part with these poses (world from canonical) removes. With `tight`, surface only counts
-    /// whole where it is met within the noise, and is not explained already.
+    /// Contradictions that a part with these poses (world from canonical) removes. With `tight`,
+    /// surface only counts whole where it is met within the noise, and is not explained already.
     pub fn gain(&self, evidence: &Evidence, claims: &Claims, poses: &[Pose], tight: bool) -> f64 {
         let between = state_to_state(poses);
         let each = |(s, fewest): &(Sample, f64)| {
             let v = Met::new(evidence, claims, s, &between[s.state]);
             let removed = (fewest - v.against.count_ones() as f64).max(0.0);
-            // A motion that is nearly right everywhere is wrong: what remains weighs on what is removed.
+            // A motion that is nearly right everywhere is wrong: what remains weighs on what is
+            // removed.
             let removed = removed * (removed / fewest).powi(2);
             let (share, met) = match (v.fresh, v.possible) {
                 (0, 0) => return removed * UNSEEN_SHARE,

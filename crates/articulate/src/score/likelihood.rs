@@ -1,7 +1,8 @@
 //! How well a finished tree explains what moved, finer than the grid.
 //!
-//! E = sum over samples of the best part's sum over states of [`agreement`](super::agreement::agreement). On the grid a motion that is a
-//! voxel off is as good as the right one.
+//! E = sum over samples of the best part's sum over states of
+//! [`agreement`](super::agreement::agreement). On the grid a motion that is a voxel off is as good
+//! as the right one.
 
 use super::agreement::total_agreement;
 use super::compare::CORRELATED;

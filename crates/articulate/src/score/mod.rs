@@ -1,4 +1,5 @@
-//! How well a motion, a part or a whole tree explains the evidence. Pure functions; what a score counts is in each file's head.
+//! How well a motion, a part or a whole tree explains the evidence. Pure functions; what a score
+//! counts is in each file's head.
 
 pub mod agreement;
 pub mod claims;

@@ -3,11 +3,12 @@
 use super::verdict::Verdict;
 use crate::config::MANY_STATES;
 
-/// Share of all contradictions that a single rigid thing would have: a part's screw and its values have to be paid for by what they
-/// explain.
+/// Share of all contradictions that a single rigid thing would have: a part's screw and its values
+/// have to be paid for by what they explain.
 const SHARE_OF_ALL: f64 = 0.015;
-/// With few states more is explained by chance: share of what is left, times the number of states. Below [`MANY_STATES`] of all: there
-/// leftovers of parts that are right invite further ones (three drawers).
+/// With few states more is explained by chance: share of what is left, times the number of states.
+/// Below [`MANY_STATES`] of all: there leftovers of parts that are right invite further ones (three
+/// drawers).
 const SHARE_BY_CHANCE: f64 = 0.06;
 
 /// The price of one more part.

@@ -1,7 +1,8 @@
 //! What breaks ties between motions that explain the recording nearly equally well.
 //!
-//! Two states of a cabinet with two equal doors are explained as well by doors that change places. Real joints are seldom
-//! like that, so a few percent go to motions that are usual. They never outweigh evidence of more than that.
+//! Two states of a cabinet with two equal doors are explained as well by doors that change places.
+//! Real joints are seldom like that, so a few percent go to motions that are usual. They never
+//! outweigh evidence of more than that.
 
 use crate::observe::sample::Sample;
 use hingecast_geom::{JointKind, Screw};
@@ -10,8 +11,8 @@ use hingecast_geom::{JointKind, Screw};
 const ON_BASE_GAIN: f64 = 0.15;
 /// A slide where a hinge far away would do.
 const SLIDE_GAIN: f64 = 0.02;
-/// A turn by half a circle loses this, and smaller turns much less: flat things look the same upside down, but few hinges
-/// open that far.
+/// A turn by half a circle loses this, and smaller turns much less: flat things look the same
+/// upside down, but few hinges open that far.
 const HALF_TURN_LOSS: f64 = 0.3;
 /// An axis along the part's faces or square to them, as in nearly everything that people build.
 const ALONG_FACES_GAIN: f64 = 0.15;

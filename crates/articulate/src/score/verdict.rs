@@ -7,7 +7,8 @@ use crate::observe::sample::{Motion, Sample};
 use hingecast_geom::Pose;
 use rayon::prelude::*;
 
-/// Per sample, one bit a state: where its predicted place was seen empty, and where a surface was found there.
+/// Per sample, one bit a state: where its predicted place was seen empty, and where a surface was
+/// found there.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Verdict {
     /// States that saw the place empty.
@@ -23,11 +24,12 @@ impl Verdict {
     }
 }
 
-/// What is left of the base's contradictions when a part moves a sample to where nobody looked: that explains most of it,
-/// but another part that can show the sample explains it better.
+/// What is left of the base's contradictions when a part moves a sample to where nobody looked:
+/// that explains most of it, but another part that can show the sample explains it better.
 const UNSEEN_LEFT: f64 = 0.3;
 
-/// Fewest contradictions of sample `i` under any of the parts in `verdicts`, of which the first is the base.
+/// Fewest contradictions of sample `i` under any of the parts in `verdicts`, of which the first is
+/// the base.
 pub fn contradictions(verdicts: &[impl AsRef<[Verdict]>], i: usize) -> f64 {
     let still = verdicts[0].as_ref()[i].against.count_ones() as f64;
     let moved = verdicts[1..].iter().map(|part| {
@@ -39,8 +41,8 @@ pub fn contradictions(verdicts: &[impl AsRef<[Verdict]>], i: usize) -> f64 {
 }
 
 impl Evidence {
-    /// `raw` with an eye for less than the grid resolves: above the surface that counts as support a sample would have been seen, and below
-    /// it nobody saw it.
+    /// `raw` with an eye for less than the grid resolves: above the surface that counts as support
+    /// a sample would have been seen, and below it nobody saw it.
     pub fn sharpened(&self, raw: Verdict, s: &Sample, from: &[Motion]) -> Verdict {
         let mut v = raw;
         for (t, m) in from.iter().enumerate().filter(|(t, _)| raw.support >> t & 1 == 1) {
@@ -66,7 +68,8 @@ impl Evidence {
         v
     }
 
-    /// What all states say about every sample if it moved with `poses` (world from canonical, per state).
+    /// What all states say about every sample if it moved with `poses` (world from canonical, per
+    /// state).
     pub fn judge(&self, poses: &[Pose]) -> Vec<Verdict> {
         let between = state_to_state(poses);
         let raw: Vec<Verdict> = self.samples.par_iter().map(|s| self.verdict(s, &between[s.state])).collect();
@@ -88,7 +91,8 @@ impl Evidence {
         which.par_iter().map(|&i| self.without_lone(&raw, i)).collect()
     }
 
-    /// The verdict on sample `i` without contradictions that most of its neighbours do not share: these are noise.
+    /// The verdict on sample `i` without contradictions that most of its neighbours do not share:
+    /// these are noise.
     fn without_lone(&self, raw: &[Verdict], i: usize) -> Verdict {
         let mut v = raw[i];
         let mut bits = v.against;

@@ -33,7 +33,8 @@ pub struct Frames<'a> {
     pub back: &'a [Pose],
 }
 
-/// Aligns hypotheses by ICP and answers, of the best that differ, hinge and slide with the samples that fit.
+/// Aligns hypotheses by ICP and answers, of the best that differ, hinge and slide with the samples
+/// that fit.
 pub fn align(
     evidence: &Evidence,
     pair: &StatePair,

@@ -1,4 +1,5 @@
-//! Candidates for a new part on one parent: pairs of states, hypotheses, alignment, and a question to all states.
+//! Candidates for a new part on one parent: pairs of states, hypotheses, alignment, and a question
+//! to all states.
 
 use super::align_hypotheses::{Frames, align};
 use super::pairs::varied_pairs;
@@ -34,8 +35,9 @@ struct Rule {
 }
 
 const DENSE: Rule = Rule { explained: TAKEN, apart: 3.0, climbs: false };
-/// What an opened door shows for the first time stands still as far as anybody knows, but in two states it attracts so many
-/// wrong motions that the right one is lost. So with few states all is sought once more without it, and wider apart.
+/// What an opened door shows for the first time stands still as far as anybody knows, but in two
+/// states it attracts so many wrong motions that the right one is lost. So with few states all is
+/// sought once more without it, and wider apart.
 const WIDE: Rule = Rule { explained: TAKEN | POSSIBLE, apart: 7.0, climbs: true };
 
 /// A screw on a parent, ready to become a part.
@@ -54,7 +56,8 @@ pub struct Candidate {
     pub samples: Vec<Sample>,
 }
 
-/// Screws of a new part on `parent`, whose poses are `parent_poses` (world from its canonical frame).
+/// Screws of a new part on `parent`, whose poses are `parent_poses` (world from its canonical
+/// frame).
 pub fn candidates(
     evidence: &Evidence,
     claims: &Claims,

@@ -8,8 +8,8 @@ use hingecast_geom::{JointKind, Pose, Screw};
 /// Steps of the climb, voxels.
 const STEPS_VOXELS: [f64; 3] = [4.0, 2.0, 1.0];
 
-/// Moves a pose uphill in six directions: shifts along the axes of the coordinates and turns about the samples' centre. ICP alone
-/// leaves a plate where it lies in its own plane.
+/// Moves a pose uphill in six directions: shifts along the axes of the coordinates and turns about
+/// the samples' centre. ICP alone leaves a plate where it lies in its own plane.
 pub fn climb(start: Pose, samples: &[Sample], voxel: f64, score: &dyn Fn(Pose) -> f32) -> Pose {
     let centre = start.apply(mean_point(samples.iter().map(|s| s.point)));
     let far = samples.iter().map(|s| start.apply(s.point.as_dvec3()).distance_squared(centre)).sum::<f64>();

@@ -19,11 +19,13 @@ use rayon::prelude::*;
 const LEAST_SHARE: f64 = 0.002;
 const LEAST: usize = 25;
 
-/// With few states a wrong motion can look best for the first part and leave the others in pieces, so this many
-/// alternatives are followed; from [`MANY_STATES`] on the first choice has always been right.
+/// With few states a wrong motion can look best for the first part and leave the others in pieces,
+/// so this many alternatives are followed; from [`MANY_STATES`] on the first choice has always been
+/// right.
 const BEAM: usize = 4;
 
-/// Parts one after another, until nothing worth its cost is left. At most `max_parts` of them, and the base.
+/// Parts one after another, until nothing worth its cost is left. At most `max_parts` of them, and
+/// the base.
 ///
 /// # Errors
 /// The wish to stop.

@@ -14,9 +14,9 @@ use hingecast_geom::{Joint, KinematicTree, Pose};
 /// Most samples that a new joint is refined with; all of them refine the finished tree.
 const MOST_MEMBERS: usize = 6000;
 
-/// Adds the candidate to the tree as a part; its screw and values are refined and asked again in turns, first with the
-/// source samples, then with everything that moves with it.
-/// `still`: the verdicts on all samples if they moved with the parent.
+/// Adds the candidate to the tree as a part; its screw and values are refined and asked again in
+/// turns, first with the source samples, then with everything that moves with it. `still`: the
+/// verdicts on all samples if they moved with the parent.
 pub fn fit_candidate(
     evidence: &Evidence,
     claims: &Claims,

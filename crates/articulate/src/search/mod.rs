@@ -1,9 +1,11 @@
 //! Parts one after another: what no known part explains must belong to a new one.
 //!
-//! Per round: the samples that every known part's motion would put into empty space are *open*. For pairs of states and
-//! every possible parent, open samples of one state are sought in the other ([`one_point_screws`]), the best finds are
-//! aligned (ICP), turned into a hinge and a slide, and asked in all states ([`sweep_values`](crate::fit::sweep_values)). The finalists are refined by
-//! Gauss-Newton, and the one that removes the most contradictions, measured within the noise, becomes a part.
+//! Per round: the samples that every known part's motion would put into empty space are *open*. For
+//! pairs of states and every possible parent, open samples of one state are sought in the other
+//! ([`one_point_screws`]), the best finds are aligned (ICP), turned into a hinge and a slide, and
+//! asked in all states ([`sweep_values`](crate::fit::sweep_values)). The finalists are refined by
+//! Gauss-Newton, and the one that removes the most contradictions, measured within the noise,
+//! becomes a part.
 
 pub mod align_hypotheses;
 pub mod candidates;

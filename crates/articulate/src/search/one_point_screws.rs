@@ -1,11 +1,12 @@
 //! Screws from single correspondences.
 //!
-//! One oriented point (x, n) of a moving part, found again as (y, m), gives the whole screw. A slide keeps the normal,
-//! and y - x is its direction. About a hinge both y - x and m - n are square to the axis, so the axis is their cross
-//! product; the angle is that between the normals seen along it, and the centre lies where a turn by that angle takes x
-//! to y. Where the normal is parallel to the axis (scissors lying flat) the angle is left open and all are tried. So
-//! instead of matching point clouds, every pair (x, y) of few anchors and many targets is tried, and tested by
-//! carrying the other samples along: most fail within a few look-ups.
+//! One oriented point (x, n) of a moving part, found again as (y, m), gives the whole screw. A
+//! slide keeps the normal, and y - x is its direction. About a hinge both y - x and m - n are
+//! square to the axis, so the axis is their cross product; the angle is that between the normals
+//! seen along it, and the centre lies where a turn by that angle takes x to y. Where the normal is
+//! parallel to the axis (scissors lying flat) the angle is left open and all are tried. So instead
+//! of matching point clouds, every pair (x, y) of few anchors and many targets is tried, and tested
+//! by carrying the other samples along: most fail within a few look-ups.
 
 use super::distinct::{Distinct, Hypothesis, distinct};
 use super::state_pair::StatePair;

@@ -2,16 +2,18 @@
 
 /// Pairs of states per parent and round.
 const PAIRS: usize = 6;
-/// Two states show well what has moved if they show this part (one in so many) of the most that two states do.
+/// Two states show well what has moved if they show this part (one in so many) of the most that two
+/// states do.
 const WELL: usize = 4;
 /// Fewer samples do not make a pair worth looking at, or a pose worth asking.
 pub const LEAST_SAMPLES: usize = 12;
 
-/// Pairs of states that show motion, at most two from one source state and two to one target. `counts`: open samples of the first that
-/// the second contradicts. (n, n)
+/// Pairs of states that show motion, at most two from one source state and two to one target.
+/// `counts`: open samples of the first that the second contradicts. (n, n)
 ///
-/// In turns the pair where most has moved, the pair where both states show most of what has moved (a closed drawer shows its front
-/// alone, and a front fits wherever there is another), and the pair where least has moved that both show well: with luck one part alone.
+/// In turns the pair where most has moved, the pair where both states show most of what has moved
+/// (a closed drawer shows its front alone, and a front fits wherever there is another), and the
+/// pair where least has moved that both show well: with luck one part alone.
 pub fn varied_pairs(counts: &[usize], n: usize) -> Vec<usize> {
     let back = |k: usize| counts[k % n * n + k / n];
     let both = |k: usize| counts[k].min(back(k));
@@ -52,7 +54,8 @@ mod tests {
 
     #[test]
     fn pairs_are_those_with_most_motion_and_those_with_one_part_alone() {
-        // Four states: a big part has left for good from state 1 on (100 samples); a small one moves between 2 and 3 (20).
+        // Four states: a big part has left for good from state 1 on (100 samples); a small one
+        // moves between 2 and 3 (20).
         let mut counts = vec![0; 16];
         for t in 1..4 {
             (counts[t], counts[4 * t]) = (100, 110);

@@ -41,7 +41,8 @@ pub struct Ranking<'a> {
     pub seed: u64,
 }
 
-/// Faces within this angle of a new axis, or of square to it, say where it could point instead, radians; see [`along_faces`].
+/// Faces within this angle of a new axis, or of square to it, say where it could point instead,
+/// radians; see [`along_faces`].
 const NEARLY_RAD: [f64; 3] = [0.3, 0.15, 0.04];
 
 impl Ranking<'_> {
@@ -70,8 +71,9 @@ impl Ranking<'_> {
         Ranked { merit, tree, explained }
     }
 
-    /// The candidate that `found` was, with the axis that it ended at turned to where the faces say, if that is somewhere else: the
-    /// grid is blind to shifts of two voxels, and the bottom of a drawer that rises by 10 deg on its way lands on that of its case.
+    /// The candidate that `found` was, with the axis that it ended at turned to where the faces
+    /// say, if that is somewhere else: the grid is blind to shifts of two voxels, and the bottom of
+    /// a drawer that rises by 10 deg on its way lands on that of its case.
     fn straight(&self, p: &Candidate, found: &Ranked) -> Option<Candidate> {
         let joint = found.tree.joints.last().expect("a part was added");
         let axis = along_faces(&self.poses[p.parent], found.explained.iter(), joint.screw.axis, &NEARLY_RAD)?;

@@ -5,7 +5,8 @@ use crate::observe::sample::{Motion, Sample};
 use crate::score::claims::Claims;
 use glam::Vec3;
 
-/// The moving samples of one state and the surface of another, both in the parent's canonical frame.
+/// The moving samples of one state and the surface of another, both in the parent's canonical
+/// frame.
 pub struct StatePair<'a> {
     /// Moving samples of the source state.
     pub source: Vec<Sample>,
@@ -21,7 +22,8 @@ pub struct StatePair<'a> {
     pub claims: &'a Claims,
     /// Surface with one of these claims is no place to land.
     pub explained: u8,
-    /// Voxels between hypotheses: a wrong motion has hundreds of near-copies that would crowd the right one out.
+    /// Voxels between hypotheses: a wrong motion has hundreds of near-copies that would crowd the
+    /// right one out.
     pub apart: f32,
     /// World at the target state from the parent's canonical frame.
     pub place: Motion,
@@ -35,7 +37,8 @@ impl StatePair<'_> {
         answer == Answer::Surface && self.claims.at(self.target, cell) & self.explained == 0
     }
 
-    /// Source samples that land on unexplained surface, or have landing neighbours in the grid (`slack` rings).
+    /// Source samples that land on unexplained surface, or have landing neighbours in the grid
+    /// (`slack` rings).
     pub fn fitting(&self, m: &Motion, slack: usize) -> Vec<Sample> {
         let v = self.space.lattice.voxel;
         let offsets: Vec<Vec3> = if slack == 0 {

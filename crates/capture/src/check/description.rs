@@ -8,7 +8,8 @@ use hingecast_geom::pose::rigidity_error;
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::PathBuf;
 
-/// Fewer usable views of a state than this leave surface unseen; fewer than three leave nothing to fit.
+/// Fewer usable views of a state than this leave surface unseen; fewer than three leave nothing to
+/// fit.
 const FEW_VIEWS: usize = 12;
 const TOO_FEW_VIEWS: usize = 3;
 /// Poses that are off by less than this can be made rigid without guessing.

@@ -1,5 +1,5 @@
-//! Repairs that need no guessing. `transforms.json` is kept beside the new one as `transforms.json.bak`; images are never
-//! changed, an inverted mask is written under a new name.
+//! Repairs that need no guessing. `transforms.json` is kept beside the new one as
+//! `transforms.json.bak`; images are never changed, an inverted mask is written under a new name.
 
 use super::CheckReport;
 use crate::recording::{images, transforms};
@@ -49,7 +49,8 @@ pub enum Fix {
 /// More than this share of frames is not dropped: then the cause should be found.
 const MOST_DROPPED: f64 = 0.5;
 
-/// Applies all fixes of a report. Returns what was done, one line each; run `check` again afterwards.
+/// Applies all fixes of a report. Returns what was done, one line each; run `check` again
+/// afterwards.
 ///
 /// # Errors
 /// When a file cannot be read or written, or most frames would have to go.
@@ -121,7 +122,8 @@ pub fn fix(path: &Path, report: &CheckReport) -> Result<Vec<String>, CaptureErro
     Ok(done)
 }
 
-/// A copy beside the file: `.bak`, or `.bak2` and so on where a file of that name is another's or another time's. None is written over.
+/// A copy beside the file: `.bak`, or `.bak2` and so on where a file of that name is another's or
+/// another time's. None is written over.
 fn backup(file: &Path) -> Result<(), CaptureError> {
     let text = std::fs::read(file).map_err(|e| CaptureError::read(file, e))?;
     let kept = free(
@@ -165,8 +167,8 @@ fn change_pose(frame: &mut Value, change: impl Fn(DMat4) -> DMat4) {
     frame["transform_matrix"] = json!(changed.transpose().to_cols_array_2d());
 }
 
-/// Gram and Schmidt, shared evenly: repeated averaging with the inverse transpose converges to the polar factor
-/// (Higham 1986), the rotation nearest to the matrix.
+/// Gram and Schmidt, shared evenly: repeated averaging with the inverse transpose converges to the
+/// polar factor (Higham 1986), the rotation nearest to the matrix.
 fn orthonormalise(frame: &mut Value) {
     change_pose(frame, |m| {
         let mut r = DMat3::from_mat4(m);
@@ -208,7 +210,8 @@ fn scale_depth(value: &mut Value, factor: f64) {
     }
 }
 
-/// True when something changed. Where folders number the states, the number is written into the frames.
+/// True when something changed. Where folders number the states, the number is written into the
+/// frames.
 fn renumber_states(documents: &mut [transforms::Document]) -> bool {
     let in_folders = documents.len() > 1;
     let mut numbers = BTreeMap::<u64, u64>::new();

@@ -1,8 +1,8 @@
-//! Looks over a recording before hours are spent on it: names what is wrong, where, what to try, and repairs what can be
-//! repaired safely.
+//! Looks over a recording before hours are spent on it: names what is wrong, where, what to try,
+//! and repairs what can be repaired safely.
 //!
-//! Three passes: the description (`transforms.json`), every image, and whether cameras, depth, masks and states agree with
-//! each other in space.
+//! Three passes: the description (`transforms.json`), every image, and whether cameras, depth,
+//! masks and states agree with each other in space.
 
 mod description;
 mod fix;
@@ -85,7 +85,8 @@ impl CheckReport {
         self.findings.iter().any(|f| f.severity == Severity::Error)
     }
 
-    /// The findings for a person: of many alike the first few, the last of them saying how many more there are.
+    /// The findings for a person: of many alike the first few, the last of them saying how many
+    /// more there are.
     pub fn summary(&self) -> Vec<Finding> {
         let count = |code: &str| self.findings.iter().filter(|f| f.code == code).count();
         let mut shown = std::collections::BTreeMap::<&str, usize>::new();
@@ -152,7 +153,8 @@ fn warning(code: &'static str, what: String, place: String, hint: &str) -> Findi
     Finding { severity: Severity::Warning, code, what, place, hint: hint.into(), fix: None }
 }
 
-/// Where frame `i` of the recording stands in its file: frames with problems were left out, so positions differ.
+/// Where frame `i` of the recording stands in its file: frames with problems were left out, so
+/// positions differ.
 fn address(documents: &[transforms::Document], recording: &Recording, i: usize) -> (PathBuf, usize, String) {
     let color = &recording.frames[i].color;
     let state = recording.frames[i].state;

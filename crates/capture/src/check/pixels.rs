@@ -1,4 +1,5 @@
-//! Every image is decoded once: readable, of the right size, not the same bytes twice, masks that make sense.
+//! Every image is decoded once: readable, of the right size, not the same bytes twice, masks that
+//! make sense.
 
 use super::{Finding, Fix, Severity, address, error, warning};
 use crate::recording::transforms::Document;

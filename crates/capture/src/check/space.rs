@@ -1,4 +1,5 @@
-//! Do cameras, depth, masks and states agree in space? Points of one view are carried into other views.
+//! Do cameras, depth, masks and states agree in space? Points of one view are carried into other
+//! views.
 
 use super::pixels::Look;
 use super::{Finding, Fix, Severity, address, error, warning};
@@ -7,12 +8,14 @@ use crate::{CaptureError, Recording, Split};
 use glam::{DMat3, DVec3};
 use hingecast_geom::Camera;
 
-/// Factors by which depth units are mistaken: metres, centimetres, millimetres, tenths, RealSense and TUM units.
+/// Factors by which depth units are mistaken: metres, centimetres, millimetres, tenths, RealSense
+/// and TUM units.
 const UNITS: [f64; 10] = [1e-4, 1e-3, 1e-2, 0.1, 0.2, 5.0, 10.0, 100.0, 1e3, 1e4];
 /// Views of a state that are compared with each other, and points of each.
 const VIEWS: usize = 8;
 const POINTS: usize = 150;
-/// Share of points that must land on the object in another view when all is well; below the second all is not.
+/// Share of points that must land on the object in another view when all is well; below the second
+/// all is not.
 const AGREES: f64 = 0.7;
 const DISAGREES: f64 = 0.5;
 
@@ -53,7 +56,8 @@ fn one_place(recording: &Recording, out: &mut Vec<Finding>) {
     }
 }
 
-/// The point nearest to all optical axes should lie in front of the cameras. True also when there is no such point.
+/// The point nearest to all optical axes should lie in front of the cameras. True also when there
+/// is no such point.
 fn look_inward(recording: &Recording) -> bool {
     let rays: Vec<(DVec3, DVec3)> = recording
         .frames
@@ -114,7 +118,8 @@ fn points(look: &Look, camera: &Camera, scale: f64) -> Vec<DVec3> {
         .collect()
 }
 
-/// How points fare in another view: on the object's silhouette; at the depth that is seen there; all.
+/// How points fare in another view: on the object's silhouette; at the depth that is seen there;
+/// all.
 #[derive(Default)]
 struct Fate {
     on_object: usize,
@@ -135,7 +140,8 @@ fn carry(points: &[DVec3], look: &Look, camera: &Camera, scale: f64, tolerance: 
     }
 }
 
-/// Depth in the wrong unit: points of one view miss the object in the others, and hit it at another scale.
+/// Depth in the wrong unit: points of one view miss the object in the others, and hit it at another
+/// scale.
 fn depth_unit(recording: &Recording, looks: &[Option<Look>], by_state: &[Vec<usize>]) -> Option<Finding> {
     let score = |scale: f64| {
         let mut fate = Fate::default();
@@ -174,8 +180,8 @@ fn depth_unit(recording: &Recording, looks: &[Option<Look>], by_state: &[Vec<usi
     }
 }
 
-/// A state whose cloud lies elsewhere as a whole: its points meet the surfaces of no other state, though they meet those
-/// of their own.
+/// A state whose cloud lies elsewhere as a whole: its points meet the surfaces of no other state,
+/// though they meet those of their own.
 fn states_apart(recording: &Recording, looks: &[Option<Look>], by_state: &[Vec<usize>], out: &mut Vec<Finding>) {
     let n = by_state.len();
     let clouds: Vec<Vec<Vec<DVec3>>> = by_state
@@ -189,7 +195,8 @@ fn states_apart(recording: &Recording, looks: &[Option<Look>], by_state: &[Vec<u
     if n < 2 || all.len() < 100 {
         return;
     }
-    // A tolerance of 4 % of a typical state's extent: the lid of a closed laptop counts as its keyboard.
+    // A tolerance of 4 % of a typical state's extent: the lid of a closed laptop counts as its
+    // keyboard.
     let extent = |cloud: &Vec<Vec<DVec3>>| {
         let (lo, hi) =
             cloud.iter().flatten().fold((DVec3::INFINITY, DVec3::NEG_INFINITY), |(l, h), &x| (l.min(x), h.max(x)));
@@ -223,7 +230,8 @@ fn states_apart(recording: &Recording, looks: &[Option<Look>], by_state: &[Vec<u
             );
             let hint = "register all states together (one reconstruction over all pictures), then export again";
             let mut finding = error("states-apart", CaptureError::new(what, place, hint));
-            // With two states nothing tells a registration that failed from an object of which most has moved.
+            // With two states nothing tells a registration that failed from an object of which most
+            // has moved.
             if n == 2 {
                 finding.severity = Severity::Warning;
             }
@@ -232,5 +240,6 @@ fn states_apart(recording: &Recording, looks: &[Option<Look>], by_state: &[Vec<u
     }
 }
 
-/// Even a laptop whose lid makes half of it keeps more than this share of its agreement between two states.
+/// Even a laptop whose lid makes half of it keeps more than this share of its agreement between two
+/// states.
 const SHARED_FRAME: f64 = 0.35;

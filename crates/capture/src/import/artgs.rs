@@ -1,5 +1,6 @@
-//! ArtGS and its family: `transforms_{train,test}_{start,end}.json` in NeRF's older layout, poses camera-to-world with
-//! OpenGL axes, principal point in the middle; `rgba/` images with alpha, `depth/` beside them in millimetres.
+//! ArtGS and its family: `transforms_{train,test}_{start,end}.json` in NeRF's older layout, poses
+//! camera-to-world with OpenGL axes, principal point in the middle; `rgba/` images with alpha,
+//! `depth/` beside them in millimetres.
 
 use super::numbers::{image_size, json, matrix, pose_from_gl, with_image_ending, wrong};
 use super::{Lens, MaskFrom, Shot};

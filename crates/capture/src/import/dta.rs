@@ -1,5 +1,5 @@
-//! DTA: `cam_K.txt`, `init_keyframes.yml` with `cam_in_ob` (camera-to-world, OpenGL) and time 0 or 1 per frame id,
-//! `color_segmented/`, `depth_filtered/` (millimetres, maybe smaller), `mask/`.
+//! DTA: `cam_K.txt`, `init_keyframes.yml` with `cam_in_ob` (camera-to-world, OpenGL) and time 0 or
+//! 1 per frame id, `color_segmented/`, `depth_filtered/` (millimetres, maybe smaller), `mask/`.
 
 use super::numbers::{camera, image_size, pose_from_gl, rows, with_image_ending, wrong};
 use super::{Lens, MaskFrom, Shot};
@@ -52,7 +52,8 @@ fn state_of_id(id: &str) -> f64 {
     id.split('_').next().and_then(|s| s.parse().ok()).unwrap_or(0.0)
 }
 
-/// The few YAML shapes that this file has: mappings by indentation, numbers in `[a, b]` or in `- a` lines.
+/// The few YAML shapes that this file has: mappings by indentation, numbers in `[a, b]` or in `- a`
+/// lines.
 fn keyframes(text: &str) -> Vec<Keyframe> {
     let mut out: Vec<Keyframe> = Vec::new();
     let mut reading_matrix = false;

@@ -1,5 +1,5 @@
-//! Dynamic 3D Gaussians: `{train,test}_meta.json` = {w, h, k[t][c] 3x3, w2c[t][c] 4x4 (OpenCV), fn[t][c]}, `ims/<fn>`,
-//! `seg/<fn>.png` with 1 = object. Each time step is a state.
+//! Dynamic 3D Gaussians: `{train,test}_meta.json` = {w, h, k[t][c] 3x3, w2c[t][c] 4x4 (OpenCV),
+//! fn[t][c]}, `ims/<fn>`, `seg/<fn>.png` with 1 = object. Each time step is a state.
 
 use super::numbers::{camera, json, matrix, pose_from_cv, wrong};
 use super::{Lens, MaskFrom, Shot};

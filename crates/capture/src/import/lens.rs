@@ -3,8 +3,8 @@
 use glam::DVec2;
 use hingecast_geom::Camera;
 
-/// Radial k1..k4 (powers 2, 4, 6, 8 of the radius, as in nerfstudio) and tangential p1 p2; or OpenCV's fisheye, where
-/// k1..k4 act on powers of the angle.
+/// Radial k1..k4 (powers 2, 4, 6, 8 of the radius, as in nerfstudio) and tangential p1 p2; or
+/// OpenCV's fisheye, where k1..k4 act on powers of the angle.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(crate) struct Lens {
     pub k: [f64; 4],

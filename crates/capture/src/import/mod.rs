@@ -1,7 +1,7 @@
 //! Other layouts of the field into native recordings.
 //!
-//! Each layout's file lists its pictures as `Shot`s; `store` decodes, undistorts, brings depth and mask to the colour's
-//! size and writes them. World frame and scale stay the source's.
+//! Each layout's file lists its pictures as `Shot`s; `store` decodes, undistorts, brings depth and
+//! mask to the colour's size and writes them. World frame and scale stay the source's.
 
 mod artgs;
 mod dta;

@@ -1,5 +1,6 @@
-//! nerfstudio: `transforms.json`; for several states one folder each with a `transforms.json`, or frames with our `state`
-//! or a `time` of a few values. `applied_transform` is in the poses already.
+//! nerfstudio: `transforms.json`; for several states one folder each with a `transforms.json`, or
+//! frames with our `state` or a `time` of a few values. `applied_transform` is in the poses
+//! already.
 
 use super::{Lens, MaskFrom, Shot, numbers, subfolders};
 use crate::CaptureError;
@@ -49,7 +50,8 @@ pub(super) fn read(src: &Path) -> Result<Vec<Shot>, CaptureError> {
     Ok(shots)
 }
 
-/// States in the order of time, when there are few times. Keys are bit patterns: times >= 0 sort like their bits.
+/// States in the order of time, when there are few times. Keys are bit patterns: times >= 0 sort
+/// like their bits.
 fn states_by_time(d: &Document) -> BTreeMap<u64, usize> {
     let mut times: Vec<f64> = d.entries.iter().filter_map(|e| e.time).collect();
     times.sort_by(f64::total_cmp);

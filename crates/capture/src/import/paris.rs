@@ -1,5 +1,6 @@
-//! PARIS: `{start,end}/camera_{train,val,test}.json` = {"K": 3x3, "0000": 4x4 camera-to-world OpenGL, ...} and RGBA images
-//! in `{start,end}/{train,val,test}/`. Its reader forces the principal point to the middle, so does this one.
+//! PARIS: `{start,end}/camera_{train,val,test}.json` = {"K": 3x3, "0000": 4x4 camera-to-world
+//! OpenGL, ...} and RGBA images in `{start,end}/{train,val,test}/`. Its reader forces the principal
+//! point to the middle, so does this one.
 
 use super::numbers::{image_size, json, matrix, pose_from_gl, with_image_ending, wrong};
 use super::{Lens, MaskFrom, Shot};

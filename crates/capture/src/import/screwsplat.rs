@@ -1,5 +1,5 @@
-//! ScrewSplat: one folder a state with `images/*.png` (RGBA), `extrinsics/*.npy` (world-to-camera, OpenCV),
-//! `intrinsic.npy`, and maybe `depths/` (.npy in scene units, .png in millimetres).
+//! ScrewSplat: one folder a state with `images/*.png` (RGBA), `extrinsics/*.npy` (world-to-camera,
+//! OpenCV), `intrinsic.npy`, and maybe `depths/` (.npy in scene units, .png in millimetres).
 
 use super::numbers::{camera, files, image_size, pose_from_cv, rows, wrong};
 use super::{Lens, MaskFrom, Shot, subfolders};

@@ -143,7 +143,8 @@ fn nearest(sw: usize, sh: usize, w: usize, h: usize) -> impl Iterator<Item = usi
     (0..w * h).map(move |i| ((i / w) * sh / h) * sw + (i % w) * sw / w)
 }
 
-/// The source's own unit when 16 bits hold all depths in it, so that nothing is rounded; else a power of ten that does.
+/// The source's own unit when 16 bits hold all depths in it, so that nothing is rounded; else a
+/// power of ten that does.
 fn fine_scale(depth: &[f64], own: f64) -> f64 {
     let farthest = depth.iter().fold(0.0f64, |a, &z| a.max(z));
     let whole = depth.iter().all(|z| (z / own - (z / own).round()).abs() < 1e-3);
@@ -157,8 +158,8 @@ fn fine_scale(depth: &[f64], own: f64) -> f64 {
     scale
 }
 
-/// The picture of the ideal pinhole camera: colour bilinear, mask and depth nearest. Second: 255 where the distorted
-/// picture did not reach, if anywhere.
+/// The picture of the ideal pinhole camera: colour bilinear, mask and depth nearest. Second: 255
+/// where the distorted picture did not reach, if anywhere.
 fn undistorted(shot: &Shot, camera: &Camera, from: Picture) -> (Picture, Option<Vec<u8>>) {
     let (w, h) = (camera.width, camera.height);
     let n = w * h;

@@ -1,7 +1,9 @@
-//! A subset of MJCF, enough for sample objects: bodies, one hinge or slide joint each, visual geoms, materials, textures,
-//! OBJ meshes, defaults. Planes, and geoms of group 3 and above (collision by MuJoCo's custom), are not seen.
+//! A subset of MJCF, enough for sample objects: bodies, one hinge or slide joint each, visual
+//! geoms, materials, textures, OBJ meshes, defaults. Planes, and geoms of group 3 and above
+//! (collision by MuJoCo's custom), are not seen.
 //!
-//! Bodies without a joint belong to their parent's part; free joints are ignored: the object stands where it is modelled.
+//! Bodies without a joint belong to their parent's part; free joints are ignored: the object stands
+//! where it is modelled.
 
 use super::mesh_file::Library;
 use super::xml::{Reader, children};
@@ -238,7 +240,8 @@ impl<'a, 'i> Loader<'a, 'i> {
         Ok(Joint { name, parent, child, screw, values: Vec::new(), limits })
     }
 
-    /// A geom's triangles in its own frame, and body_from_geom; `None` when it is not meant to be seen.
+    /// A geom's triangles in its own frame, and body_from_geom; `None` when it is not meant to be
+    /// seen.
     fn geom(&mut self, node: Node<'a, 'i>, class: &str) -> Result<Option<(PartGeometry, Pose)>, CaptureError> {
         let group = self.numbers::<1>(node, "group", class)?.map_or(0.0, |g| g[0]);
         let kind = self.attribute(node, "type", class).unwrap_or("sphere");
@@ -305,7 +308,8 @@ impl<'a, 'i> Loader<'a, 'i> {
         Ok(out)
     }
 
-    /// Material index and texture repetition of a geom; its own rgba replaces the material's colour.
+    /// Material index and texture repetition of a geom; its own rgba replaces the material's
+    /// colour.
     fn material(&mut self, node: Node<'a, 'i>, class: &str) -> Result<(u32, [f64; 2]), CaptureError> {
         let (mut material, repeat) = match self.attribute(node, "material", class) {
             Some(name) => {

@@ -1,6 +1,7 @@
 //! Articulated objects with their looks: what `synth` renders and `rollout` compares with.
 //!
-//! Geometry stands in the world frame (z up) with every joint at 0, the canonical configuration, as the tree's screws do.
+//! Geometry stands in the world frame (z up) with every joint at 0, the canonical configuration, as
+//! the tree's screws do.
 
 mod mesh_file;
 mod mjcf;
@@ -63,7 +64,8 @@ pub struct Material {
 }
 
 impl ArticulatedObject {
-    /// Loads a URDF or MJCF file, or a folder with `mobility.urdf`, `object.xml`, or a single such file.
+    /// Loads a URDF or MJCF file, or a folder with `mobility.urdf`, `object.xml`, or a single such
+    /// file.
     ///
     /// # Errors
     /// When nothing is found, or the description or one of its meshes cannot be read.
@@ -85,8 +87,8 @@ impl ArticulatedObject {
         }
     }
 
-    /// Finds an OBJECT argument: a path, or a bare name in `objects/` (here or in `$HINGECAST_OBJECTS`) or in
-    /// `$HINGECAST_DATA/partnet-mobility-dev/`.
+    /// Finds an OBJECT argument: a path, or a bare name in `objects/` (here or in
+    /// `$HINGECAST_OBJECTS`) or in `$HINGECAST_DATA/partnet-mobility-dev/`.
     ///
     /// # Errors
     /// When it is nowhere; the hint lists the places.
@@ -111,8 +113,9 @@ impl ArticulatedObject {
         ))
     }
 
-    /// Names the parts, drops doubled faces, checks the whole. A part is called after its first link that has a name
-    /// of its own in `names` or else is `seen` (has geometry); same names get numbers.
+    /// Names the parts, drops doubled faces, checks the whole. A part is called after its first
+    /// link that has a name of its own in `names` or else is `seen` (has geometry); same names get
+    /// numbers.
     fn finish(
         mut self,
         library: mesh_file::Library,
@@ -213,8 +216,8 @@ impl PartGeometry {
         self.materials.extend_from_slice(&mesh.materials);
     }
 
-    /// Keeps one of several faces over the same three corners. PartNet stores each face twice with opposite winding,
-    /// and two coincident colours would flicker.
+    /// Keeps one of several faces over the same three corners. PartNet stores each face twice with
+    /// opposite winding, and two coincident colours would flicker.
     pub(crate) fn drop_duplicate_faces(&mut self) {
         let key = |v: Vec3| (v * 1e5).round().as_ivec3().to_array();
         let mut seen = std::collections::HashSet::new();

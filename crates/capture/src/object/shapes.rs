@@ -68,7 +68,8 @@ fn arc(from: f64, to: f64, steps: usize) -> impl Iterator<Item = (f64, f64)> {
     (0..=steps).map(move |i| from + (to - from) * i as f64 / steps as f64).map(|a| (a.cos(), a.sin()))
 }
 
-/// Surface of revolution about z. `profile` from bottom to top: radius, z, normal's radial and z parts.
+/// Surface of revolution about z. `profile` from bottom to top: radius, z, normal's radial and z
+/// parts.
 fn revolve(profile: &[[f64; 4]], material: u32) -> PartGeometry {
     let mut out = PartGeometry::default();
     for (row, &[r, z, nr, nz]) in profile.iter().enumerate() {

@@ -51,7 +51,8 @@ impl Texture {
         Vec2::new(self.levels[0].width as f32, self.levels[0].height as f32)
     }
 
-    /// Linear-light colour at `uv` (repeating, v up as in OBJ), blended between the two mip levels around `level`.
+    /// Linear-light colour at `uv` (repeating, v up as in OBJ), blended between the two mip levels
+    /// around `level`.
     pub fn sample(&self, uv: Vec2, level: f32) -> Vec3 {
         let level = level.clamp(0.0, (self.levels.len() - 1) as f32);
         let (fine, blend) = (level as usize, level.fract());

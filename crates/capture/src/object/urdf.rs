@@ -1,7 +1,8 @@
-//! URDF: links with visuals, joints; the PartNet-Mobility layout is a URDF whose base joint turns y-up meshes upright.
+//! URDF: links with visuals, joints; the PartNet-Mobility layout is a URDF whose base joint turns
+//! y-up meshes upright.
 //!
-//! Only what is seen is read: visuals and joints. Fixed joints, and joints that don't matter (wheels, buttons), merge
-//! their child into the parent's part, at 0.
+//! Only what is seen is read: visuals and joints. Fixed joints, and joints that don't matter
+//! (wheels, buttons), merge their child into the parent's part, at 0.
 
 use super::mesh_file::Library;
 use super::xml::{Reader, children};
@@ -103,8 +104,8 @@ pub(super) fn load(file: &Path, xml: &Document) -> Result<ArticulatedObject, Cap
     object.finish(library, &names, seen).map_err(|e| reader.error(e, "correct the links and joints"))
 }
 
-/// Meanings of PartNet links: semantics.txt ("link_2 hinge lid") where it speaks of these links; in some objects it
-/// numbers them otherwise, and the visuals' names ("lid-3") have to do.
+/// Meanings of PartNet links: semantics.txt ("link_2 hinge lid") where it speaks of these links; in
+/// some objects it numbers them otherwise, and the visuals' names ("lid-3") have to do.
 fn partnet_names(folder: &Path, links: &[(String, Node)]) -> BTreeMap<String, String> {
     let text = std::fs::read_to_string(folder.join("semantics.txt")).unwrap_or_default();
     let words = |l: &str| l.split_whitespace().map(String::from).collect::<Vec<_>>();
@@ -125,7 +126,8 @@ fn partnet_names(folder: &Path, links: &[(String, Node)]) -> BTreeMap<String, St
     links.iter().filter_map(|(name, n)| Some((name.clone(), of_visual(n)?))).collect()
 }
 
-/// Joints that stay at 0: those that gt.json calls minor, or whose child is a wheel, knob or button.
+/// Joints that stay at 0: those that gt.json calls minor, or whose child is a wheel, knob or
+/// button.
 fn minor_joints(folder: &Path, joints: &[UrdfJoint], names: &BTreeMap<String, String>) -> BTreeSet<String> {
     let truth: Option<serde_json::Value> =
         std::fs::read_to_string(folder.join("gt.json")).ok().and_then(|t| serde_json::from_str(&t).ok());

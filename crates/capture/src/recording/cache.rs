@@ -1,7 +1,8 @@
 //! Decoded views within a byte budget.
 //!
-//! Decoding three PNGs takes milliseconds, expanding a packed view a tenth of one. So views are kept packed, 6 bytes a
-//! pixel, and the least recently used leave when the budget is full: 1500 views at 256 x 256 fit 590 MB.
+//! Decoding three PNGs takes milliseconds, expanding a packed view a tenth of one. So views are
+//! kept packed, 6 bytes a pixel, and the least recently used leave when the budget is full: 1500
+//! views at 256 x 256 fit 590 MB.
 
 use super::packed_depth::PackedDepth;
 use super::{Recording, View, view};
@@ -72,7 +73,8 @@ impl ViewCache {
         gone.map_or_else(|| self.recording.load(frame), |(_, packed)| Ok(packed.unpack()))
     }
 
-    /// Decodes frames in parallel so that later `get`s are quick; stops adding when the budget is full.
+    /// Decodes frames in parallel so that later `get`s are quick; stops adding when the budget is
+    /// full.
     ///
     /// # Errors
     /// As [`Recording::load`], the first frame in the list that fails.
@@ -95,7 +97,8 @@ impl ViewCache {
     }
 
     fn lock(&self) -> std::sync::MutexGuard<'_, Kept> {
-        // A panic elsewhere leaves a consistent map: every change below is complete before the lock opens.
+        // A panic elsewhere leaves a consistent map: every change below is complete before the lock
+        // opens.
         self.kept.lock().unwrap_or_else(PoisonError::into_inner)
     }
 

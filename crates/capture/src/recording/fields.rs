@@ -3,7 +3,8 @@
 use crate::CaptureError;
 use serde_json::{Map, Value};
 
-/// A JSON object, where it stands, and the object whose keys it inherits (nerfstudio's per-frame over global keys).
+/// A JSON object, where it stands, and the object whose keys it inherits (nerfstudio's per-frame
+/// over global keys).
 pub(crate) struct Fields<'a> {
     pub object: &'a Map<String, Value>,
     pub inherits: Option<&'a Map<String, Value>>,

@@ -1,4 +1,5 @@
-//! A hash that changes when the recording does: stages compare it with their stamp to know whether to run again.
+//! A hash that changes when the recording does: stages compare it with their stamp to know whether
+//! to run again.
 
 use super::{Recording, transforms};
 use crate::CaptureError;
@@ -32,8 +33,9 @@ impl Recording {
     }
 }
 
-/// All of them whole: an .npy, a JPEG or a raw mask has no checksum that a sample could find, and times of change are lost by a copy.
-/// 1500 files of 30 kB take 40 ms on two cores, where samples of each took 30: opening them is the work.
+/// All of them whole: an .npy, a JPEG or a raw mask has no checksum that a sample could find, and
+/// times of change are lost by a copy. 1500 files of 30 kB take 40 ms on two cores, where samples
+/// of each took 30: opening them is the work.
 fn content(path: &Path) -> std::io::Result<u128> {
     Ok(xxh3_128(&std::fs::read(path)?))
 }
@@ -44,7 +46,8 @@ mod tests {
     use serde_json::json;
     use std::fs;
 
-    /// Depth that changed in the middle of an .npy once went unnoticed: samples were taken at the start, middle and end.
+    /// Depth that changed in the middle of an .npy once went unnoticed: samples were taken at the
+    /// start, middle and end.
     #[test]
     fn every_byte_of_every_file_counts() {
         let dir = tempfile::tempdir().unwrap();

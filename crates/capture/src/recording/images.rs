@@ -29,7 +29,8 @@ pub fn read(path: &Path) -> Result<DynamicImage, CaptureError> {
     })
 }
 
-/// Depth in stored units (h*w, row-major) with its size: grey PNG of 8 or 16 bits, or .npy of (h, w) numbers.
+/// Depth in stored units (h*w, row-major) with its size: grey PNG of 8 or 16 bits, or .npy of (h,
+/// w) numbers.
 ///
 /// # Errors
 /// When the file is missing or broken, is coloured, or is no array of two dimensions.

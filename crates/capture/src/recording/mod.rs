@@ -1,9 +1,10 @@
 //! The native recording: nerfstudio's `transforms.json` plus our per-frame `state`.
 //!
-//! Keys of ours, all optional but `state`: per frame `state` (integer), `view`, `time` (seconds), `occluded` (bool),
-//! `occluder_mask_path`; for the whole `name`, `metric` (lengths are metres), `up` (world direction, default z).
-//! Instead of `state` a recording may have one `state_000/transforms.json` per state.
-//! Held-out frames are those that nerfstudio's `test_filenames` lists.
+//! Keys of ours, all optional but `state`: per frame `state` (integer), `view`, `time` (seconds),
+//! `occluded` (bool), `occluder_mask_path`; for the whole `name`, `metric` (lengths are metres),
+//! `up` (world direction, default z). Instead of `state` a recording may have one
+//! `state_000/transforms.json` per state. Held-out frames are those that nerfstudio's
+//! `test_filenames` lists.
 
 mod cache;
 mod fields;
@@ -78,7 +79,8 @@ pub struct Recording {
     pub up: DVec3,
 }
 
-/// Largest tolerated entry of |R'R - 1|: json files with 4 digits stay below, a scaled or sheared pose does not.
+/// Largest tolerated entry of |R'R - 1|: json files with 4 digits stay below, a scaled or sheared
+/// pose does not.
 pub(crate) const MAX_RIGIDITY_ERROR: f64 = 1e-3;
 
 impl Recording {
@@ -96,7 +98,8 @@ impl Recording {
         }
     }
 
-    /// What can be made of the documents; everything that is wrong goes to `problems`, frames with problems are left out.
+    /// What can be made of the documents; everything that is wrong goes to `problems`, frames with
+    /// problems are left out.
     pub(crate) fn from_documents(documents: &[Document], problems: &mut Vec<Problem>) -> Self {
         let root = documents.first().map(|d| d.root.clone()).unwrap_or_default();
         let mut frames = Vec::new();
@@ -170,7 +173,8 @@ fn frame(entry: &Entry, default_view: usize) -> Result<Frame, CaptureError> {
     })
 }
 
-/// OpenCV `camera_from_world` of an OpenGL camera-to-world matrix: negate columns y and z, then invert.
+/// OpenCV `camera_from_world` of an OpenGL camera-to-world matrix: negate columns y and z, then
+/// invert.
 pub(crate) fn camera_from_gl(world_from_gl: &DMat4, place: &str) -> Result<Pose, CaptureError> {
     let error = hingecast_geom::pose::rigidity_error(world_from_gl);
     let value = || format!("{place}.transform_matrix");

@@ -16,7 +16,8 @@ pub enum PackedDepth {
 }
 
 impl PackedDepth {
-    /// Depth that came from 16-bit files in units of `scale` goes back to it exactly; anything else stays as it is.
+    /// Depth that came from 16-bit files in units of `scale` goes back to it exactly; anything else
+    /// stays as it is.
     pub fn new(depth: &[f32], scale: f32) -> Self {
         let units =
             || depth.iter().map(|&z| (z / scale).round()).map(|u| (0.0..65536.0).contains(&u).then_some(u as u16));

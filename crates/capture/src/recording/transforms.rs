@@ -169,7 +169,8 @@ pub(crate) fn parse(root: &Path, file: &Path, folder_state: DefaultState) -> Res
     Ok(document)
 }
 
-/// JSON, forgiving Python's NaN and Infinity: they become null, and the field that holds one is named later.
+/// JSON, forgiving Python's NaN and Infinity: they become null, and the field that holds one is
+/// named later.
 fn read_json(text: &str, file: &Path) -> Result<Value, CaptureError> {
     let text = text.trim_start_matches('\u{feff}');
     let error = match serde_json::from_str(text) {
@@ -231,7 +232,8 @@ fn entry(
     })
 }
 
-/// nerfstudio's keys; also `camera_angle_x` of the older NeRF layout. Without w and h the image itself is asked.
+/// nerfstudio's keys; also `camera_angle_x` of the older NeRF layout. Without w and h the image
+/// itself is asked.
 fn intrinsics(f: &Fields, color: &Path) -> Result<Intrinsics, CaptureError> {
     let (width, height) = match (f.count("w")?, f.count("h")?) {
         (Some(w), Some(h)) => (w, h),

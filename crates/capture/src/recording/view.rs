@@ -65,7 +65,8 @@ pub(crate) fn load(f: &Frame) -> Result<View, CaptureError> {
     Ok(View { camera: f.camera, rgb, depth, mask, usable })
 }
 
-/// Transparent pictures come over white, the background that `synth` uses; alpha above one half is the object.
+/// Transparent pictures come over white, the background that `synth` uses; alpha above one half is
+/// the object.
 fn over_white(rgba: &[u8]) -> (Vec<u8>, Vec<u8>) {
     let mix = |c: u8, a: u8| ((u32::from(c) * u32::from(a) + 255 * (255 - u32::from(a)) + 127) / 255) as u8;
     let rgb = rgba.chunks_exact(4).flat_map(|p| [mix(p[0], p[3]), mix(p[1], p[3]), mix(p[2], p[3])]).collect();

@@ -6,8 +6,9 @@ use serde_json::{Map, Value, json};
 use std::path::Path;
 
 impl Recording {
-    /// Writes `transforms.json` into `self.root` from the frames; image paths are written relative to the root.
-    /// Intrinsics that all frames share stand once at the top, as nerfstudio writes them.
+    /// Writes `transforms.json` into `self.root` from the frames; image paths are written relative
+    /// to the root. Intrinsics that all frames share stand once at the top, as nerfstudio writes
+    /// them.
     ///
     /// # Errors
     /// When the file cannot be written.

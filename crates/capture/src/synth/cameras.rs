@@ -8,14 +8,17 @@ use std::f64::consts::TAU;
 /// Sines of the lowest and highest elevation: from just above the horizon to almost straight down.
 const LOWEST: f64 = 0.04;
 const HIGHEST: f64 = 0.985;
-/// The object reaches at most this share of the half frame, in the view where it is largest: about 80 % on average.
+/// The object reaches at most this share of the half frame, in the view where it is largest: about
+/// 80 % on average.
 const FILL: f64 = 0.94;
 
-/// `n` unit vectors from the centre to the cameras: a Fibonacci spiral, uniform over the area, turned and jittered.
+/// `n` unit vectors from the centre to the cameras: a Fibonacci spiral, uniform over the area,
+/// turned and jittered.
 pub(crate) fn directions(n: usize, rng: &mut fastrand::Rng) -> Vec<DVec3> {
     let golden = TAU * (2.0 / (1.0 + 5f64.sqrt()));
     let turn = rng.f64() * TAU;
-    // Up to 40 % of the distance between neighbours: enough to break the pattern, too little to open holes.
+    // Up to 40 % of the distance between neighbours: enough to break the pattern, too little to
+    // open holes.
     let jitter = 0.4 / (n.max(1) as f64).sqrt();
     (0..n)
         .map(|i| {
@@ -58,7 +61,8 @@ impl Subject {
         for &d in directions {
             let unit = Camera::look_at(self.centre + d, self.centre, DVec3::Z, 2, 2, fov);
             for &p in &self.points {
-                // In camera axes, with the camera at distance D: |x| / (D - depth towards camera) <= slope.
+                // In camera axes, with the camera at distance D: |x| / (D - depth towards camera)
+                // <= slope.
                 let x = unit.camera_from_world.rotate(p - self.centre);
                 distance = distance.max(x.x.abs().max(x.y.abs()) / slope - x.z);
             }

@@ -15,7 +15,8 @@ pub struct SynthConfig {
     pub views: usize,
     /// Held-out cameras per state.
     pub test_views: usize,
-    /// Held-out joint configurations between recorded ones; their frames are all test frames. 0 with fewer than 3 states.
+    /// Held-out joint configurations between recorded ones; their frames are all test frames. 0
+    /// with fewer than 3 states.
     pub test_states: usize,
     /// Width and height of the images, pixels.
     pub size: usize,
@@ -23,7 +24,8 @@ pub struct SynthConfig {
     pub fov_deg: f64,
     /// The same cameras for all states (a rig); false: a person walks around anew for each state.
     pub same_cameras: bool,
-    /// Joint name -> first and last value of its play, radians or scene units. Others get their useful range.
+    /// Joint name -> first and last value of its play, radians or scene units. Others get their
+    /// useful range.
     pub ranges: BTreeMap<String, [f64; 2]>,
     /// sRGB behind the object.
     pub background: [u8; 3],
@@ -31,8 +33,8 @@ pub struct SynthConfig {
     pub noise: Noise,
     /// Share of the training frames into which a hand and forearm reach, 0..1.
     pub occluders: f64,
-    /// A recording of play: in every training frame hands hold the parts that move, and move along; `time` runs. Instead of
-    /// `occluders`.
+    /// A recording of play: in every training frame hands hold the parts that move, and move along;
+    /// `time` runs. Instead of `occluders`.
     pub play: bool,
     /// Write the truth folder beside the recording.
     pub truth: bool,

@@ -1,7 +1,8 @@
 //! Renders a recording of an articulated object, and the truth about it.
 //!
-//! Cameras stand on the upper hemisphere; joints are played as a person would (see `play`); colour is supersampled, depth
-//! and masks are exact at pixel centres. Everything is a function of the object, the configuration and its seed.
+//! Cameras stand on the upper hemisphere; joints are played as a person would (see `play`); colour
+//! is supersampled, depth and masks are exact at pixel centres. Everything is a function of the
+//! object, the configuration and its seed.
 
 mod cameras;
 mod config;
@@ -32,14 +33,16 @@ use rayon::prelude::*;
 use std::path::Path;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
-/// Sensors and hands have sizes in metres. An object without metric scale counts as this large (its diagonal), a small
-/// piece of furniture.
+/// Sensors and hands have sizes in metres. An object without metric scale counts as this large (its
+/// diagonal), a small piece of furniture.
 const ASSUMED_DIAGONAL_METRES: f64 = 0.8;
 
-/// Records `object` into the folder `out` (and `<out>.truth`). A recording that stands there is replaced as a whole.
+/// Records `object` into the folder `out` (and `<out>.truth`). A recording that stands there is
+/// replaced as a whole.
 ///
 /// # Errors
-/// When the configuration makes no sense, the disk is full, `out` holds something else, or the person asked to stop.
+/// When the configuration makes no sense, the disk is full, `out` holds something else, or the
+/// person asked to stop.
 pub fn synth(
     object: &ArticulatedObject,
     config: &SynthConfig,
@@ -128,7 +131,8 @@ struct Studio<'a> {
 }
 
 impl Studio<'_> {
-    /// Renders and writes all views of a state; the same hand reaches into some of them, or holds on in all.
+    /// Renders and writes all views of a state; the same hand reaches into some of them, or holds
+    /// on in all.
     fn record_state(
         &self,
         state: usize,

@@ -1,9 +1,10 @@
 //! What an Intel RealSense D435 and a hand-held camera do to a perfect picture.
 //!
-//! Depth comes from disparity d = f b / z, so an error of s pixels in d is an error of s z^2 / (f b) in z
-//! (Keselman et al. 2017, "Intel RealSense Stereoscopic Depth Cameras"). Disparity is quantised. Stereo finds nothing
-//! at grazing angles and beside depth edges. Colours get noise and each view its own exposure; masks, which a network
-//! made, are off by 1 to 3 pixels along the edge; camera poses, which tracking made, by 0.5 deg and 3 mm.
+//! Depth comes from disparity d = f b / z, so an error of s pixels in d is an error of s z^2 / (f
+//! b) in z (Keselman et al. 2017, "Intel RealSense Stereoscopic Depth Cameras"). Disparity is
+//! quantised. Stereo finds nothing at grazing angles and beside depth edges. Colours get noise and
+//! each view its own exposure; masks, which a network made, are off by 1 to 3 pixels along the
+//! edge; camera poses, which tracking made, by 0.5 deg and 3 mm.
 
 use super::output::Exposure;
 use glam::{DQuat, DVec3};
@@ -12,15 +13,16 @@ use hingecast_geom::{Camera, Pose};
 
 /// Focal length at 1280 x 720 [px] times baseline [m].
 const FOCAL_TIMES_BASELINE: f64 = 640.0 * 0.050;
-/// Standard deviations of the disparity [px at 1280 x 720]: pixel by pixel, and over patches (the matching window).
-/// Together they give about 2 mm at 1 m, as measured on a textured wall.
+/// Standard deviations of the disparity [px at 1280 x 720]: pixel by pixel, and over patches (the
+/// matching window). Together they give about 2 mm at 1 m, as measured on a textured wall.
 const DISPARITY_FINE: f64 = 0.05;
 const DISPARITY_PATCH: f64 = 0.04;
 const DISPARITY_STEP: f64 = 1.0 / 32.0;
-/// Steeper than this against the ray, stereo starts to lose the surface; at the second slope it has lost it. Tangents
-/// of 70 and 82 degrees.
+/// Steeper than this against the ray, stereo starts to lose the surface; at the second slope it has
+/// lost it. Tangents of 70 and 82 degrees.
 const GRAZING: [f64; 2] = [2.75, 7.1];
-/// A jump of more than this share of z is an edge, and the pixels beside it are lost with this probability.
+/// A jump of more than this share of z is an edge, and the pixels beside it are lost with this
+/// probability.
 const EDGE_JUMP: f32 = 0.03;
 const EDGE_LOSS: f64 = 0.5;
 /// sRGB steps of 255: read noise, and photon noise of white.

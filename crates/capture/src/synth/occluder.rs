@@ -1,11 +1,13 @@
-//! The hand and forearm of the person who moves the object, made of capsules. Here it grips the part that moves most around a
-//! state and comes from outside, anew in every state; `player` holds on.
+//! The hand and forearm of the person who moves the object, made of capsules. Here it grips the
+//! part that moves most around a state and comes from outside, anew in every state; `player` holds
+//! on.
 
 use crate::object::{ArticulatedObject, PartGeometry, shapes};
 use glam::{DQuat, DVec3};
 use hingecast_geom::Pose;
 
-/// Metres, of a grown-up: forearm radius and length, palm radius and half length, finger radius and length.
+/// Metres, of a grown-up: forearm radius and length, palm radius and half length, finger radius and
+/// length.
 pub(super) const FOREARM: [f64; 2] = [0.042, 0.45];
 const PALM: [f64; 2] = [0.035, 0.03];
 const FINGER: [f64; 2] = [0.009, 0.075];
@@ -42,7 +44,8 @@ pub(super) fn hand(
     arm(grip, outward, unit, skin)
 }
 
-/// A hand that grips at `grip` and its forearm, which comes along `outward`. `unit`: scene units of a metre.
+/// A hand that grips at `grip` and its forearm, which comes along `outward`. `unit`: scene units of
+/// a metre.
 pub(super) fn arm(grip: DVec3, outward: DVec3, unit: f64, skin: u32) -> PartGeometry {
     let mut out = PartGeometry::default();
     let mut capsule = |from: DVec3, to: DVec3, radius: f64| {

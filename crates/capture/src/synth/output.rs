@@ -23,7 +23,8 @@ pub(crate) struct Exposure {
     pub mask: Vec<u8>,
     /// Part id + 1, 0 = background; stays exact whatever the sensor does.
     pub labels: Vec<u8>,
-    /// 255 = hand, also where it only tints the pixel: a ring of one pixel around it, since colour is supersampled.
+    /// 255 = hand, also where it only tints the pixel: a ring of one pixel around it, since colour
+    /// is supersampled.
     pub occluder: Option<Vec<u8>>,
     pub occluded: bool,
 }
@@ -49,7 +50,8 @@ impl Exposure {
         }
     }
 
-    /// Marks the frame as occluded when the hand hides most of the object. `bare` is the scene without the hand.
+    /// Marks the frame as occluded when the hand hides most of the object. `bare` is the scene
+    /// without the hand.
     pub fn note_hidden(&mut self, bare: &Scene, camera: &Camera) {
         let Some(hand) = &self.occluder else { return };
         let hits = |i: usize| {

@@ -1,6 +1,8 @@
-//! How a person plays with the joints: one after the other, overlapping in time, each through its whole range.
+//! How a person plays with the joints: one after the other, overlapping in time, each through its
+//! whole range.
 
-/// Share of the neighbour's sweep that a joint's sweep overlaps: some states then show two joints moving together.
+/// Share of the neighbour's sweep that a joint's sweep overlaps: some states then show two joints
+/// moving together.
 const OVERLAP: f64 = 0.3;
 /// How far the first joint is pushed back at the end, as a person closes what he opened first.
 const PUSHED_BACK: f64 = 0.45;
@@ -12,8 +14,9 @@ pub(crate) struct Play {
 }
 
 impl Play {
-    /// `behind`: of each joint, whether it moves only when others are open; these come last, and nothing is pushed back into their way.
-    /// `two_states`: only first and last are recorded, so every joint goes all the way.
+    /// `behind`: of each joint, whether it moves only when others are open; these come last, and
+    /// nothing is pushed back into their way. `two_states`: only first and last are recorded, so
+    /// every joint goes all the way.
     pub fn new(behind: &[bool], two_states: bool, rng: &mut fastrand::Rng) -> Self {
         let n_joints = behind.len();
         if two_states || n_joints == 1 {
@@ -33,7 +36,8 @@ impl Play {
         Self { sweeps }
     }
 
-    /// Fraction of its range (0 = start of the range, 1 = end) at which each joint stands at `time`.
+    /// Fraction of its range (0 = start of the range, 1 = end) at which each joint stands at
+    /// `time`.
     pub fn fractions(&self, time: f64) -> Vec<f64> {
         self.sweeps
             .iter()

@@ -1,8 +1,10 @@
-//! The hands of a play: each holds a moving part where a person would, moves along with it, and is seen by every training camera.
+//! The hands of a play: each holds a moving part where a person would, moves along with it, and is
+//! seen by every training camera.
 //!
-//! A hand holds where the part sticks out farthest from its hinge, in the middle of that edge; a slide is held in the middle of its
-//! front. It is rigid in the part's frame, lets go while the joint rests and takes hold at the same spot again. The forearm comes
-//! from where, over all the states in which it holds, it stays clearest of the object and above what the object stands on.
+//! A hand holds where the part sticks out farthest from its hinge, in the middle of that edge; a
+//! slide is held in the middle of its front. It is rigid in the part's frame, lets go while the
+//! joint rests and takes hold at the same spot again. The forearm comes from where, over all the
+//! states in which it holds, it stays clearest of the object and above what the object stands on.
 
 use super::occluder::{self, FOREARM};
 use super::ranges::sample;

@@ -1,12 +1,13 @@
 //! The range over which a joint is worth playing.
 //!
-//! Limits in files are wider than the physical ones, and 0 is the mesh as stored, neither closed nor open. So: sample
-//! points of the moving side, follow them from 0 outwards in small steps, and count those whose path pierces a surface of
-//! the other side. The range ends where a fifth has gone through something, at the beginning of that rise. If what is left is wider
-//! than a person would move it, keep the end at which the object is the most compact: that is the closed one.
+//! Limits in files are wider than the physical ones, and 0 is the mesh as stored, neither closed
+//! nor open. So: sample points of the moving side, follow them from 0 outwards in small steps, and
+//! count those whose path pierces a surface of the other side. The range ends where a fifth has
+//! gone through something, at the beginning of that rise. If what is left is wider than a person
+//! would move it, keep the end at which the object is the most compact: that is the closed one.
 //!
-//! A rack behind a door, or a seat below a lid, goes nowhere while all else is closed. What is stuck like that is asked once more with
-//! everything else open.
+//! A rack behind a door, or a seat below a lid, goes nowhere while all else is closed. What is
+//! stuck like that is asked once more with everything else open.
 
 use super::scene::Scene;
 use crate::object::{ArticulatedObject, PartGeometry};
@@ -28,8 +29,9 @@ pub struct UsefulRange {
 const WIDEST_TURN_DEG: f64 = 100.0;
 const STEPS: usize = 60;
 const POINTS: usize = 3000;
-/// Share of the moving points that may pierce the rest. Real files overlap: a door's rim leaves its frame (7 % of its
-/// points), a drawer grazes its rails (14 %), scissors their other half (10 %); a lid that hits its body goes to 40 %.
+/// Share of the moving points that may pierce the rest. Real files overlap: a door's rim leaves its
+/// frame (7 % of its points), a drawer grazes its rails (14 %), scissors their other half (10 %); a
+/// lid that hits its body goes to 40 %.
 const PIERCING: f64 = 0.2;
 /// Share gained in one step that belongs to a collision, not to grazing.
 const RISE: f64 = 0.004;

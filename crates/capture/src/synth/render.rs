@@ -6,19 +6,20 @@ use crate::object::texture::srgb_from_linear;
 use glam::{DVec2, Vec3, Vec3A};
 use hingecast_geom::{Camera, Pose};
 
-/// A rendered view, row-major. `depth` in scene units, 0 where nothing is hit; `part` is part id + 1, 0 = background.
+/// A rendered view, row-major. `depth` in scene units, 0 where nothing is hit; `part` is part id +
+/// 1, 0 = background.
 pub(crate) struct Picture {
     pub rgb: Vec<u8>,
     pub depth: Vec<f32>,
     pub part: Vec<u8>,
 }
 
-/// Colour samples per pixel side: everywhere, and in pixels that hold an edge. Print needs no finer samples, its texture
-/// is filtered already.
+/// Colour samples per pixel side: everywhere, and in pixels that hold an edge. Print needs no finer
+/// samples, its texture is filtered already.
 const COARSE: usize = 2;
 const FINE: usize = 4;
-/// Two hits belong to one smooth surface when their normals are closer than this cosine (14 degrees) and their depths
-/// within this share.
+/// Two hits belong to one smooth surface when their normals are closer than this cosine (14
+/// degrees) and their depths within this share.
 const SMOOTH_COS: f32 = 0.97;
 const SMOOTH_DEPTH: f32 = 0.02;
 

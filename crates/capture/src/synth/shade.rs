@@ -1,21 +1,22 @@
-//! The look of a surface point: diffuse colour under fixed lights of mild contrast. All in linear light.
+//! The look of a surface point: diffuse colour under fixed lights of mild contrast. All in linear
+//! light.
 //!
-//! Nothing is cast: no shadows, no highlights, so that a point keeps its colour while cameras move and changes it only
-//! mildly when its part turns, as under a cloudy sky.
+//! Nothing is cast: no shadows, no highlights, so that a point keeps its colour while cameras move
+//! and changes it only mildly when its part turns, as under a cloudy sky.
 
 use super::occluder;
 use super::scene::Hit;
 use crate::object::{ArticulatedObject, Material, PartGeometry};
 use glam::{Vec2, Vec3, Vec3A};
 
-/// Light from below and above (blended by the normal), and two soft lamps: direction to the lamp and strength.
-/// White under all of them stays below 1, so nothing is clipped.
+/// Light from below and above (blended by the normal), and two soft lamps: direction to the lamp
+/// and strength. White under all of them stays below 1, so nothing is clipped.
 const GROUND: f32 = 0.42;
 const SKY: f32 = 0.58;
 const LAMPS: [([f32; 3], f32); 2] = [([0.48, -0.36, 0.80], 0.28), ([-0.74, 0.56, 0.37], 0.12)];
 
-/// What shading needs: the parts (hands may follow the object's own), materials, and per face how many texels a unit of
-/// length covers, for the mip level.
+/// What shading needs: the parts (hands may follow the object's own), materials, and per face how
+/// many texels a unit of length covers, for the mip level.
 pub(crate) struct Looks<'a> {
     object: &'a ArticulatedObject,
     parts: Vec<&'a PartGeometry>,
@@ -58,8 +59,8 @@ impl<'a> Looks<'a> {
         a.part == b.part && material(a) == material(b)
     }
 
-    /// Linear-light colour of a hit. `footprint` is the side of the sample's patch at the hit, scene units;
-    /// `turn` rotates canonical normals into the world.
+    /// Linear-light colour of a hit. `footprint` is the side of the sample's patch at the hit,
+    /// scene units; `turn` rotates canonical normals into the world.
     pub fn shade(&self, hit: &Hit, direction: Vec3A, footprint: f32, turn: glam::Quat) -> Vec3 {
         let part = self.parts[hit.part];
         let corners = part.faces[hit.face].map(|i| i as usize);

@@ -1,4 +1,5 @@
-//! Recordings and their truths appear whole or not at all, and replace nothing but recordings and truths.
+//! Recordings and their truths appear whole or not at all, and replace nothing but recordings and
+//! truths.
 
 use crate::CaptureError;
 use hingecast_geom::folder::{may_be_emptied, may_become};
@@ -36,10 +37,12 @@ impl Staging {
     }
 }
 
-/// Whether a recording or a truth may be written at `target`, and what is there deleted: it is new, empty, or what we wrote before.
+/// Whether a recording or a truth may be written at `target`, and what is there deleted: it is new,
+/// empty, or what we wrote before.
 ///
 /// # Errors
-/// It holds something else. `transforms.json` alone is no proof: captures of people have one as well, beside pictures that nobody can take again.
+/// It holds something else. `transforms.json` alone is no proof: captures of people have one as
+/// well, beside pictures that nobody can take again.
 pub fn may_be_replaced(target: &Path) -> Result<(), CaptureError> {
     may_become("output folder", target, &["transforms.json", "truth.json"], HINT)?;
     may_be_emptied(
@@ -55,14 +58,16 @@ fn transforms(target: &Path) -> PathBuf {
     target.join("transforms.json")
 }
 
-/// Whether we wrote the recording's `transforms.json`: others' do not say what is up and whether it is metric.
+/// Whether we wrote the recording's `transforms.json`: others' do not say what is up and whether it
+/// is metric.
 fn wrote(target: &Path) -> bool {
     let text = std::fs::read(transforms(target)).unwrap_or_default();
     let json: serde_json::Value = serde_json::from_slice(&text).unwrap_or_default();
     ["up", "metric", "frames"].iter().all(|key| json.get(key).is_some())
 }
 
-/// Whether a file of this path is one that `synth` or `import` writes into a recording or its truth.
+/// Whether a file of this path is one that `synth` or `import` writes into a recording or its
+/// truth.
 fn is_ours(path: &Path) -> bool {
     let names: Option<Vec<&str>> = path.iter().map(|name| name.to_str()).collect();
     match names.as_deref() {
@@ -86,7 +91,8 @@ mod tests {
     use super::*;
     use std::fs;
 
-    /// Any folder with a transforms.json once was replaced as a whole, a person's captures included.
+    /// Any folder with a transforms.json once was replaced as a whole, a person's captures
+    /// included.
     #[test]
     fn only_what_we_wrote_is_replaced() {
         let dir = tempfile::tempdir().unwrap();

@@ -79,7 +79,8 @@ fn joints(session: &Session, args: &Bench, suite: &[Named]) -> Result<Outcome> {
     Ok(Outcome::Done)
 }
 
-/// Makes sure that the folder is new, empty, or one of ours, and marks it as such before anything is in it.
+/// Makes sure that the folder is new, empty, or one of ours, and marks it as such before anything
+/// is in it.
 fn claim(out: &Path, file: &str) -> Result<()> {
     let hint = "give a new folder: hingecast bench SUITE -o FOLDER";
     let before = ["bench.json", "joints.json"].map(|name| out.join(name));

@@ -25,8 +25,8 @@ pub fn run_folder(out: Option<&Path>, recording: &Path) -> PathBuf {
     out.map_or_else(|| Path::new("runs").join(name), Path::to_path_buf)
 }
 
-/// What to run. Stage names that are not there, and `--from` after `--to` (it would do nothing and say that it is done), are refused before
-/// anything is thrown away.
+/// What to run. Stage names that are not there, and `--from` after `--to` (it would do nothing and
+/// say that it is done), are refused before anything is thrown away.
 fn options(session: &Session, args: &Build, method: Method) -> Result<Options> {
     let named = |name: &Option<String>| name.as_deref().map(|n| Stage::named(n, method)).transpose();
     let (from, to) = (named(&args.from)?, named(&args.to)?);

@@ -19,7 +19,8 @@ pub fn run(session: &Session, args: &cli::Experiment) -> Result<Outcome> {
     Experiment::may_become(&args.out)?;
     std::fs::create_dir_all(&args.out).map_err(Failure::io(&args.out))?;
     let mut experiment = Experiment { settings: plan.settings(), demonstrated: Vec::new(), rows: Vec::new() };
-    // Marks the folder as ours before anything is in it: who is killed with the first object may go on.
+    // Marks the folder as ours before anything is in it: who is killed with the first object may go
+    // on.
     if !args.out.join("experiment.json").exists() {
         save(&experiment, &args.out)?;
     }

@@ -84,7 +84,8 @@ pub fn objects() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("../../objects").canonicalize().unwrap()
 }
 
-/// Records the hinged box: 5 states, 10 views, 80 pixels. As small as it can be and still be built from.
+/// Records the hinged box: 5 states, 10 views, 80 pixels. As small as it can be and still be built
+/// from.
 pub fn tiny_recording(dir: &Path) -> PathBuf {
     hingecast(dir, "synth hinged_box -o rec --states 5 --views 10 --test-views 2 --size 80 -q").done();
     dir.join("rec")

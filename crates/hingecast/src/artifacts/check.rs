@@ -1,4 +1,5 @@
-//! Numbers of a run's own files that point nowhere: refused when the file is read, whoever wrote them there.
+//! Numbers of a run's own files that point nowhere: refused when the file is read, whoever wrote
+//! them there.
 
 use crate::failure::{Failure, Result};
 use crate::stage::read_json;
@@ -30,8 +31,8 @@ pub fn checked(path: &Path, verdict: Verdict) -> Result<()> {
     })
 }
 
-/// There are parts, joints connect them, and every joint has a value for each state; answers how many states that are, `None` without
-/// joints.
+/// There are parts, joints connect them, and every joint has a value for each state; answers how
+/// many states that are, `None` without joints.
 ///
 /// # Errors
 /// What is wrong with it.

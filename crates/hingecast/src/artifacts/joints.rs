@@ -17,7 +17,8 @@ pub struct Joints {
     pub labels: Vec<u8>,
     /// Gravest first.
     pub doubts: Vec<Doubt>,
-    /// Of each joint, in the tree's order; `None` where the method does not know, or a person has decided.
+    /// Of each joint, in the tree's order; `None` where the method does not know, or a person has
+    /// decided.
     pub certainty: Vec<Option<Certainty>>,
 }
 

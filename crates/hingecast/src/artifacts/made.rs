@@ -1,4 +1,5 @@
-//! What a build has made so far: in memory where a stage ran, read from the run folder where it was kept.
+//! What a build has made so far: in memory where a stage ran, read from the run folder where it was
+//! kept.
 
 use super::{Groups, Joints, Parts, Splats, samples};
 use crate::failure::Result;

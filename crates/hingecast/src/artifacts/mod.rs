@@ -7,8 +7,9 @@
 //! joints/joints.json                              Joints: the tree with a person's corrections
 //! twin/twin.json and what it names                TwinFile; written by the crate `hingecast-twin`
 //! ```
-//! A stage hands its artifact on as its file says it ([`as_written`]), so that a run that was resumed has the same bytes as one that
-//! was not. [`Made`] keeps artifacts in memory; files are read back for stages that were kept.
+//! A stage hands its artifact on as its file says it ([`as_written`]), so that a run that was
+//! resumed has the same bytes as one that was not. [`Made`] keeps artifacts in memory; files are
+//! read back for stages that were kept.
 
 pub mod check;
 pub mod joints;
@@ -31,8 +32,9 @@ use crate::stage::write_json;
 use serde::{Serialize, de::DeserializeOwned};
 use std::path::Path;
 
-/// Writes a value and answers it as a reader of the file would have it: serde_json's quick parser is off by one unit in the last place now
-/// and then, and a stage that was kept must hand on what a fresh one does.
+/// Writes a value and answers it as a reader of the file would have it: serde_json's quick parser
+/// is off by one unit in the last place now and then, and a stage that was kept must hand on what a
+/// fresh one does.
 fn write_and_settle<T: Serialize + DeserializeOwned>(path: &Path, value: &T) -> Result<T> {
     write_json(path, value)?;
     Ok(as_written(value))

@@ -38,8 +38,8 @@ pub struct Placed {
     pub parts: Vec<u8>,
     /// By depth and pictures.
     pub tree: KinematicTree,
-    /// Per state: what its cameras, as the stage before left them, take for the world, from the world. Empty where depth had the
-    /// last word.
+    /// Per state: what its cameras, as the stage before left them, take for the world, from the
+    /// world. Empty where depth had the last word.
     pub state_from_world: Vec<Pose>,
     /// What the tree cost before the pictures were asked, and after.
     pub nats: [f64; 2],

@@ -1,4 +1,5 @@
-//! What the classical way (`--method track`) leaves: `motion/state_<n>.ply` and its own `parts/parts.json`.
+//! What the classical way (`--method track`) leaves: `motion/state_<n>.ply` and its own
+//! `parts/parts.json`.
 
 use super::check::{self, checked, read_checked};
 use super::write_and_settle;

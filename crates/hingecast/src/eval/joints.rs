@@ -19,7 +19,8 @@ pub struct JointErrors {
     pub axis_deg: f64,
     /// Published tables' unit: 10 x scene units. Hinges only.
     pub axis_pos: Option<f64>,
-    /// Foot of the true part's centroid on the true axis to the found axis line, scene units. Hinges only.
+    /// Foot of the true part's centroid on the true axis to the found axis line, scene units.
+    /// Hinges only.
     pub pivot: Option<f64>,
     /// Over all pairs (first state, state s): degrees for hinges, scene units for slides.
     pub motion_mean: f64,
@@ -29,7 +30,8 @@ pub struct JointErrors {
     pub state_mean: f64,
     /// |found range - range that the recording showed|, deg or scene units.
     pub range_error: f64,
-    /// Mean and largest distance between points of the part on the found and the true path over the shown range.
+    /// Mean and largest distance between points of the part on the found and the true path over the
+    /// shown range.
     pub sweep_mean: f64,
     /// The largest on the way.
     pub sweep_max: f64,

@@ -1,5 +1,5 @@
-//! Which found part is which true part: the Hungarian method on symmetric Chamfer distances in the reference
-//! state. Roots match roots. Never on joint errors: that would hide bad parts.
+//! Which found part is which true part: the Hungarian method on symmetric Chamfer distances in the
+//! reference state. Roots match roots. Never on joint errors: that would hide bad parts.
 
 use super::surfaces::chamfer;
 use glam::Vec3;

@@ -1,4 +1,5 @@
-//! Chamfer distances and F-scores of part meshes, whole and visible, with the sampling floor beside them.
+//! Chamfer distances and F-scores of part meshes, whole and visible, with the sampling floor beside
+//! them.
 
 use crate::failure::Result;
 use glam::Vec3;
@@ -67,7 +68,8 @@ impl Seen {
         Ok(Self { views })
     }
 
-    /// The points (reference state) of a part with `motion[s]` that are not behind a measured surface in some view.
+    /// The points (reference state) of a part with `motion[s]` that are not behind a measured
+    /// surface in some view.
     fn visible(&self, points: &[Vec3], motion: &[Pose], tolerance: f32) -> Vec<Vec3> {
         let seen = |x: &Vec3| {
             self.views.iter().any(|(state, camera, depth)| {

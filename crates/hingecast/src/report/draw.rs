@@ -40,7 +40,8 @@ pub fn color_parts(image: &mut RgbImage, parts: &[u8]) {
     }
 }
 
-/// Draws a joint's axis as a line of length `length` about `centre`'s foot, with an arrow head at its positive end.
+/// Draws a joint's axis as a line of length `length` about `centre`'s foot, with an arrow head at
+/// its positive end.
 pub fn draw_axis(image: &mut RgbImage, camera: &Camera, screw: &Screw, centre: DVec3, length: f64, color: [u8; 3]) {
     let middle = if screw.kind.turns() { screw.foot(centre) } else { centre };
     let (a, b) = (middle - screw.axis * (0.5 * length), middle + screw.axis * (0.5 * length));

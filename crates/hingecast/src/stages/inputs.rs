@@ -54,7 +54,8 @@ impl Inputs<'_> {
         (0..self.recording.n_states).map(|s| self.recording.frames_of(s, Split::Train)).collect()
     }
 
-    /// Box of the masked depth of some states, world frame. That of the first state scales every length in the settings.
+    /// Box of the masked depth of some states, world frame. That of the first state scales every
+    /// length in the settings.
     ///
     /// # Errors
     /// When hardly any pixel shows the object.

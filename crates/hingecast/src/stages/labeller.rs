@@ -1,4 +1,5 @@
-//! Part labels per pixel: the gaussians rendered, each pixel given the part of the gaussian that it shows.
+//! Part labels per pixel: the gaussians rendered, each pixel given the part of the gaussian that it
+//! shows.
 
 use crate::failure::Result;
 use hingecast_capture::View;
@@ -55,8 +56,8 @@ impl Labeller {
         })
     }
 
-    /// Labels of a recorded view for fusing: background where the mask says so, the rendered part where measured and
-    /// rendered depth agree within `tolerance`, unknown elsewhere.
+    /// Labels of a recorded view for fusing: background where the mask says so, the rendered part
+    /// where measured and rendered depth agree within `tolerance`, unknown elsewhere.
     pub fn label(&mut self, view: &View, tolerance: f32) -> Result<Vec<u8>> {
         let picture = self.render(&view.camera, [0.0; 3])?;
         let labels = (0..view.mask.len()).map(|i| {

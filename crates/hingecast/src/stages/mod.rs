@@ -1,4 +1,5 @@
-//! One file a stage, named after it: plain data in, an artifact out. Stages of `--method track` are in [`classical`].
+//! One file a stage, named after it: plain data in, an artifact out. Stages of `--method track` are
+//! in [`classical`].
 
 pub mod classical;
 pub mod fit_gaussians;

@@ -1,7 +1,8 @@
 //! The labelled views that the twin is fused from, decoded once.
 //!
-//! A view is packed as soon as its pixels have parts (the label takes the place of mask and occlusion) and shown
-//! from memory from then on, as far as the budget reaches; what does not fit is decoded again whenever it is shown.
+//! A view is packed as soon as its pixels have parts (the label takes the place of mask and
+//! occlusion) and shown from memory from then on, as far as the budget reaches; what does not fit
+//! is decoded again whenever it is shown.
 
 use super::inputs::Inputs;
 use crate::failure::Result;

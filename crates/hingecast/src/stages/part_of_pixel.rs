@@ -26,8 +26,8 @@ const AROUND: usize = 64;
 impl LabelledSurface {
     fn new(points: Vec<Vec3>, parts: Vec<u8>) -> Self {
         let tree = PointTree::new(&points);
-        // A point at distance d of its nearest sample s has its `ASKED` nearest within d of itself plus s's distance to its own
-        // `ASKED` nearest, so within 2 d plus that of s.
+        // A point at distance d of its nearest sample s has its `ASKED` nearest within d of itself
+        // plus s's distance to its own `ASKED` nearest, so within 2 d plus that of s.
         let inside = |i: usize| {
             let near = tree.k_nearest(points[i], AROUND);
             let far = |k: usize| points[near[k] as usize].distance(points[i]);
@@ -43,8 +43,8 @@ impl LabelledSurface {
         Self { tree, points, parts, inside }
     }
 
-    /// The part of a point with this normal, if any sample lies within `reach` (squared): that of the sample, of the nearest few, that
-    /// lies nearest in its plane.
+    /// The part of a point with this normal, if any sample lies within `reach` (squared): that of
+    /// the sample, of the nearest few, that lies nearest in its plane.
     pub fn part_at(&self, x: Vec3, normal: Option<Vec3>, reach: f32) -> Option<u8> {
         let (nearest, squared) = self.tree.nearest(x).filter(|n| n.1 < reach)?;
         let Some(n) = normal.filter(|_| squared.sqrt() >= self.inside[nearest]) else {
@@ -60,7 +60,8 @@ impl LabelledSurface {
     }
 }
 
-/// The labelled samples of every state; `state_from_world`: how far each state's world has been moved since, if it has.
+/// The labelled samples of every state; `state_from_world`: how far each state's world has been
+/// moved since, if it has.
 pub fn surfaces(labelled: &[Labelled], n_states: usize, state_from_world: &[Pose]) -> Vec<LabelledSurface> {
     let of_state = |state: usize| {
         let own: Vec<&Labelled> = labelled.iter().filter(|s| s.state == state).collect();
@@ -71,8 +72,8 @@ pub fn surfaces(labelled: &[Labelled], n_states: usize, state_from_world: &[Pose
     (0..n_states).into_par_iter().map(of_state).collect()
 }
 
-/// Part of every pixel of a view: that of the labelled sample of its state which lies nearest in its plane, if one is within
-/// `reach` (squared, scene units).
+/// Part of every pixel of a view: that of the labelled sample of its state which lies nearest in
+/// its plane, if one is within `reach` (squared, scene units).
 pub fn parts_of_pixels(view: &View, surface: &LabelledSurface, reach: f32) -> Vec<u8> {
     let silent = |i: usize| {
         if view.usable[i] == 1 && view.mask[i] == 0 && !(view.depth[i] > 0.0) { BACKGROUND } else { UNKNOWN }

@@ -22,7 +22,8 @@ pub fn unproject(view: &View, stride: usize, emit: &mut dyn FnMut(DVec3, usize))
     }
 }
 
-/// Normal at pixel `i` from its neighbours' depth, towards the camera; `None` at edges and grazing angles.
+/// Normal at pixel `i` from its neighbours' depth, towards the camera; `None` at edges and grazing
+/// angles.
 pub fn normal(view: &View, i: usize) -> Option<Vec3> {
     let c = &view.camera;
     let (x, y) = (i % c.width, i / c.width);

@@ -1,5 +1,5 @@
-//! Stage `splat` of `--method screw`: one set of gaussians for all states, fitted with every part in its place; and what the pictures
-//! then say about these places.
+//! Stage `splat` of `--method screw`: one set of gaussians for all states, fitted with every part
+//! in its place; and what the pictures then say about these places.
 
 use super::fit_gaussians::fit_gaussians;
 use super::inputs::Inputs;
@@ -16,7 +16,8 @@ use rayon::prelude::*;
 use std::path::Path;
 use std::sync::Arc;
 
-/// Gaussians of the whole object in its first state, fitted to views of all states with every part in its place.
+/// Gaussians of the whole object in its first state, fitted to views of all states with every part
+/// in its place.
 pub fn run(inputs: &Inputs, found: &Parts, labelled: &[Labelled], at: &Path, progress: &Progress) -> Result<Splats> {
     let recording = inputs.recording;
     let frames = spread(inputs);

@@ -22,9 +22,11 @@ pub fn target(view: &View, background: ([f32; 3], bool)) -> Result<Target> {
     )?)
 }
 
-/// One colour around the object in all pictures (a studio, a renderer), or black and "paint it over".
+/// One colour around the object in all pictures (a studio, a renderer), or black and "paint it
+/// over".
 pub fn background(recording: &Recording, cache: &ViewCache) -> Result<([f32; 3], bool)> {
-    /// Largest deviation, 8-bit, that still counts as one colour: JPEG and light fall-off exceed it.
+    /// Largest deviation, 8-bit, that still counts as one colour: JPEG and light fall-off exceed
+    /// it.
     const FLAT: i32 = 3;
     let frames = recording.frames_of(0, Split::Train);
     let mut colour: Option<[u8; 3]> = None;
@@ -48,8 +50,8 @@ pub fn background(recording: &Recording, cache: &ViewCache) -> Result<([f32; 3],
     Ok(colour.map_or(([0.0; 3], false), |c| (c.map(|x| x as f32 / 255.0), true)))
 }
 
-/// What a perfect twin would render for a held-out view, (h, w, 3), 0..1: the photo, and where `background` is not what it shows around
-/// the object, painted over with it.
+/// What a perfect twin would render for a held-out view, (h, w, 3), 0..1: the photo, and where
+/// `background` is not what it shows around the object, painted over with it.
 pub fn photo(view: &View, background: ([f32; 3], bool)) -> Vec<f32> {
     let paint = |(i, c): (usize, &u8)| {
         if background.1 || view.mask[i / 3] == 1 { *c as f32 / 255.0 } else { background.0[i % 3] }

@@ -13,7 +13,8 @@ use hingecast_geom::Progress;
 use hingecast_twin::{build as twin, relabel};
 use std::path::Path;
 
-/// What labels are made from: the surface that the search labelled, and the spacing of its samples; by `--method track` the gaussians do it.
+/// What labels are made from: the surface that the search labelled, and the spacing of its samples;
+/// by `--method track` the gaussians do it.
 pub type Surface<'a> = Option<(&'a [Labelled], f32)>;
 
 /// Builds, writes into `folder`, tries. Answers all doubts about the run, gravest first.
@@ -71,7 +72,8 @@ pub fn run(
     Ok(doubts)
 }
 
-/// Labels by rendering the gaussians in every state. One picture after the other: the engine uses all threads for each.
+/// Labels by rendering the gaussians in every state. One picture after the other: the engine uses
+/// all threads for each.
 fn label_by_gaussians(
     inputs: &Inputs,
     splats: &Splats,
@@ -103,7 +105,8 @@ fn try_in_simulator(folder: &Path, diagonal: f64) -> Result<Vec<String>> {
             write_json(&folder.join("simulator.json"), &checks)?;
             Ok(checks.iter().flat_map(|c| c.doubts(diagonal)).collect())
         }
-        // A twin that MuJoCo refuses is a grave doubt, but the meshes and joints are there all the same.
+        // A twin that MuJoCo refuses is a grave doubt, but the meshes and joints are there all the
+        // same.
         Err(e) => Ok(vec![e.to_string().lines().next().unwrap_or_default().to_string()]),
     }
 }

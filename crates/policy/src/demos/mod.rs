@@ -7,8 +7,9 @@
 //!     obs/<key> (T,K)   next_obs/<key> (T,K)
 //! mask/<name>           strings demo_<i>: train, valid, or any other subset
 //! ```
-//! Source: robomimic 0.3, `robomimic/utils/dataset.py` (what it reads) and `scripts/dataset_states_to_obs.py` (what it
-//! writes). All numbers are f64 here and in the files that we write; f32 and integers are read as well.
+//! Source: robomimic 0.3, `robomimic/utils/dataset.py` (what it reads) and
+//! `scripts/dataset_states_to_obs.py` (what it writes). All numbers are f64 here and in the files
+//! that we write; f32 and integers are read as well.
 
 mod read;
 mod write;
@@ -19,7 +20,8 @@ pub use write::write;
 use crate::{ACTION_SIZE, PolicyError};
 use std::collections::BTreeMap;
 
-/// One demonstration of T steps. `rewards`, `dones`, `states` and `next_obs` may be empty where a file lacks them.
+/// One demonstration of T steps. `rewards`, `dones`, `states` and `next_obs` may be empty where a
+/// file lacks them.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Episode {
     /// The simulator's model, MJCF text; empty where the file has none.
@@ -66,8 +68,8 @@ fn index_of(name: &str) -> Option<usize> {
     name.strip_prefix("demo_")?.parse().ok()
 }
 
-/// Lengths that agree, finite numbers, masks that name what is there: asked of what is read and of what is written.
-/// `file` goes into the error.
+/// Lengths that agree, finite numbers, masks that name what is there: asked of what is read and of
+/// what is written. `file` goes into the error.
 fn check(demos: &Demos, file: &str) -> Result<(), PolicyError> {
     if demos.episodes.is_empty() {
         let hint = "record some: hingecast demos; robomimic's files have groups data/demo_0, data/demo_1, ...";

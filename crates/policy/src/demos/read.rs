@@ -6,11 +6,12 @@ use rust_hdf5::{DatatypeMessage, H5Dataset, H5File, H5Group, Hdf5Error};
 use std::collections::BTreeMap;
 use std::path::Path;
 
-/// Reads all demonstrations of `path`. Where numbers are missing among `demo_<i>`, the episodes move up and the masks follow.
-/// Observations that are pictures (more than two axes) are left out.
+/// Reads all demonstrations of `path`. Where numbers are missing among `demo_<i>`, the episodes
+/// move up and the masks follow. Observations that are pictures (more than two axes) are left out.
 ///
 /// # Errors
-/// No such file, no HDF5, damaged, without the groups and datasets that robomimic reads, of wrong shape, NaN.
+/// No such file, no HDF5, damaged, without the groups and datasets that robomimic reads, of wrong
+/// shape, NaN.
 pub fn read(path: &Path) -> Result<Demos, PolicyError> {
     let file = path.display().to_string();
     let head = read_head(path)?;

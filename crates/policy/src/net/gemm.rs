@@ -28,11 +28,13 @@ impl<'a> Matrix<'a> {
     }
 }
 
-/// c = keep c + a b, on the calling thread. The order of each sum depends on the shapes alone. With `keep` 0 what was in `c` does not matter.
+/// c = keep c + a b, on the calling thread. The order of each sum depends on the shapes alone. With
+/// `keep` 0 what was in `c` does not matter.
 pub fn gemm(a: Matrix, b: Matrix, keep: f32, c: &mut [f32]) {
     let (m, k, n) = (a.rows, a.columns, b.columns);
     assert!(k == b.rows && c.len() == m * n);
-    // Sound: the asserts above and in `Matrix::new` keep all three inside their slices; `c` is borrowed alone.
+    // Sound: the asserts above and in `Matrix::new` keep all three inside their slices; `c` is
+    // borrowed alone.
     unsafe {
         gemm::gemm(
             m,
@@ -58,9 +60,9 @@ pub fn gemm(a: Matrix, b: Matrix, keep: f32, c: &mut [f32]) {
     }
 }
 
-/// `to` (columns, rows) = `from` (rows, columns) transposed, in tiles that stay in the nearest cache. A product copies its
-/// operands into its own order anyway, but from a transposed view that takes three times as long, and recurrent weights
-/// go into one product per time step.
+/// `to` (columns, rows) = `from` (rows, columns) transposed, in tiles that stay in the nearest
+/// cache. A product copies its operands into its own order anyway, but from a transposed view that
+/// takes three times as long, and recurrent weights go into one product per time step.
 pub fn transpose(from: &[f32], columns: usize, to: &mut Vec<f32>) {
     const TILE: usize = 16;
     let rows = from.len() / columns;

@@ -1,4 +1,5 @@
-//! What the last layer says about the action: loss, gradient, and an action for a rollout. Per row, a = demonstrated action.
+//! What the last layer says about the action: loss, gradient, and an action for a rollout. Per row,
+//! a = demonstrated action.
 //!
 //! ```text
 //! action    mu = tanh(x)                                    loss = mean (mu - a)^2
@@ -55,7 +56,8 @@ fn log_sum_exp(values: &[f64]) -> f64 {
     largest + values.iter().map(|v| (v - largest).exp()).sum::<f64>().ln()
 }
 
-/// Sum of the rows' losses times `weight`; `outputs` (one per head, rows x width) become their gradients.
+/// Sum of the rows' losses times `weight`; `outputs` (one per head, rows x width) become their
+/// gradients.
 pub fn loss_and_gradient(config: &NetConfig, outputs: &mut [Vec<f32>], actions: &[f32], weight: f64) -> f64 {
     match config.head {
         Head::Action => squared_error(&mut outputs[0], actions, weight / ACTION_SIZE as f64),
@@ -122,8 +124,9 @@ fn mixture(config: &NetConfig, outputs: &mut [Vec<f32>], actions: &[f32], weight
 
 const HALF_LN_TWO_PI: f64 = 0.918_938_533_204_672_7;
 
-/// An action as robomimic takes it in evaluation: a mode by its weight, then its mean with a deviation of [`EVAL_STD`]
-/// (gmm); the mean itself (gaussian, action). `outputs`: one row per head.
+/// An action as robomimic takes it in evaluation: a mode by its weight, then its mean with a
+/// deviation of [`EVAL_STD`] (gmm); the mean itself (gaussian, action). `outputs`: one row per
+/// head.
 pub fn sample(config: &NetConfig, outputs: &[Vec<f32>], rng: &mut fastrand::Rng) -> [f64; ACTION_SIZE] {
     if config.head != Head::Gmm {
         let limit = if config.head == Head::Gaussian { MEAN_LIMIT } else { f32::INFINITY };
@@ -145,7 +148,8 @@ pub fn sample(config: &NetConfig, outputs: &[Vec<f32>], rng: &mut fastrand::Rng)
 mod tests {
     use super::*;
 
-    /// Modes come as often as their weights say, at their means, with the small deviation around them.
+    /// Modes come as often as their weights say, at their means, with the small deviation around
+    /// them.
     #[test]
     fn modes_are_drawn_by_weight() {
         let config = NetConfig { num_modes: 3, ..Default::default() };

@@ -1,4 +1,5 @@
-//! One LSTM layer over a batch of sequences that begin with a state of zeros (Hochreiter & Schmidhuber 1997, as PyTorch has it).
+//! One LSTM layer over a batch of sequences that begin with a state of zeros (Hochreiter &
+//! Schmidhuber 1997, as PyTorch has it).
 //!
 //! ```text
 //! [i f g o] = x W_ih' + b_ih + h W_hh' + b_hh      i f o through sigmoid, g through tanh
@@ -18,7 +19,8 @@ use super::math::{sigmoid, tanh, vectorised};
 /// What the backward pass needs of the forward pass. B sequences, T steps, H hidden.
 #[derive(Default)]
 pub struct LstmMemory {
-    /// (T B, 4 H): the gates after their activations; in the backward pass the gradients before them.
+    /// (T B, 4 H): the gates after their activations; in the backward pass the gradients before
+    /// them.
     gates: Vec<f32>,
     /// ((T+1) B, H): row blocks 0 are the zeros before the first step.
     cells: Vec<f32>,
@@ -52,7 +54,8 @@ impl LstmMemory {
     }
 }
 
-/// The weights transposed: (inputs, 4 H) and (H, 4 H). Once per training step, for all parts of a batch.
+/// The weights transposed: (inputs, 4 H) and (H, 4 H). Once per training step, for all parts of a
+/// batch.
 #[derive(Default)]
 pub struct Transposed {
     weight_ih: Vec<f32>,
@@ -110,7 +113,8 @@ pub fn forward(
     }
 }
 
-/// `x` as in the forward pass; `d_output`: (T B, H). Writes the layer's gradients; with `d_x` also those of its inputs.
+/// `x` as in the forward pass; `d_output`: (T B, H). Writes the layer's gradients; with `d_x` also
+/// those of its inputs.
 pub fn backward(
     layer: &LstmLayer,
     parameters: &[f32],
@@ -180,7 +184,8 @@ vectorised! {
 }
 
 vectorised! {
-    /// One row: activations become gradients (in place); `next_cells` comes from the next step and leaves for the one before.
+    /// One row: activations become gradients (in place); `next_cells` comes from the next step and
+    /// leaves for the one before.
     pub fn cell_backward(
         gates: &mut [f32], before: &[f32], tanh_cells: &[f32], d_output: &[f32], next_hidden: &[f32], next_cells: &mut [f32],
     ) {

@@ -1,7 +1,8 @@
 //! exp, tanh and sigmoid written so that compilers make vector code of the loops around them.
 //!
-//! A training step at hidden 400 asks for four million of these; libm's would take longer than the matrix products. Cephes'
-//! polynomials (S. Moshier, expf.c and tanhf.c); no fused multiply-add, so every instruction set gives the same bits.
+//! A training step at hidden 400 asks for four million of these; libm's would take longer than the
+//! matrix products. Cephes' polynomials (S. Moshier, expf.c and tanhf.c); no fused multiply-add, so
+//! every instruction set gives the same bits.
 
 /// e^x; relative error below 2e-7. Saturates outside -87 .. 88.
 #[inline(always)]
@@ -52,7 +53,8 @@ pub fn softplus(x: f32) -> f32 {
     x.max(0.0) + (-x.abs()).exp().ln_1p()
 }
 
-/// Compiles `$body` twice, for every CPU and for those with 8-wide vectors, and calls what the CPU has.
+/// Compiles `$body` twice, for every CPU and for those with 8-wide vectors, and calls what the CPU
+/// has.
 macro_rules! vectorised {
     ($(#[$meta:meta])* pub fn $name:ident($($arg:ident: $type:ty),* $(,)?) $body:block) => {
         $(#[$meta])*

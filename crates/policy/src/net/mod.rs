@@ -1,12 +1,14 @@
-//! The networks of behaviour cloning, forward and backward by hand: LSTM layers, an MLP, linear heads, Adam.
+//! The networks of behaviour cloning, forward and backward by hand: LSTM layers, an MLP, linear
+//! heads, Adam.
 //!
 //! ```text
 //! observation (inputs) -> [LSTM x layers] -> [linear + ReLU] x mlp -> heads
 //! heads: action | mean, scale | mean, scale, logits
 //! ```
-//! Names, order of parameters and initial values are those of robomimic 0.3 on PyTorch (`models/base_nets.py`,
-//! `models/policy_nets.py`), so that weights go from one to the other by name. Everything is row-major f32; a batch of B
-//! sequences of T steps is T x B rows, the rows of one time together. [`mod@reference`] is the slow twin in f64.
+//! Names, order of parameters and initial values are those of robomimic 0.3 on PyTorch
+//! (`models/base_nets.py`, `models/policy_nets.py`), so that weights go from one to the other by
+//! name. Everything is row-major f32; a batch of B sequences of T steps is T x B rows, the rows of
+//! one time together. [`mod@reference`] is the slow twin in f64.
 
 mod adam;
 mod gemm;
@@ -153,8 +155,9 @@ impl Network {
         let mut net =
             Self { config: config.clone(), inputs, tensors: vec![], lstm: vec![], mlp: vec![], heads: vec![] };
         let (mut width, hidden) = (inputs, config.rnn_hidden);
-        // The recurrent layers first, as `parameters()` of robomimic's networks lists the LSTM after MLP and decoder; the
-        // order matters to nobody: Adam works per number and files are read by name.
+        // The recurrent layers first, as `parameters()` of robomimic's networks lists the LSTM
+        // after MLP and decoder; the order matters to nobody: Adam works per number and files are
+        // read by name.
         for layer in 0..config.rnn_layers {
             let bound = 1.0 / (hidden as f64).sqrt();
             let mut push =
@@ -204,7 +207,8 @@ impl Network {
         self.tensors.last().map_or(0, |t| t.range.end)
     }
 
-    /// PyTorch's defaults: U(+-1/sqrt(hidden)) in the LSTM, U(+-1/sqrt(inputs)) in linear layers, biases included.
+    /// PyTorch's defaults: U(+-1/sqrt(hidden)) in the LSTM, U(+-1/sqrt(inputs)) in linear layers,
+    /// biases included.
     pub fn initial_parameters(&self, seed: u64) -> Vec<f32> {
         let mut rng = fastrand::Rng::with_seed(seed);
         let mut out = Vec::with_capacity(self.parameters());

@@ -6,11 +6,12 @@ use super::{Linear, Network, head};
 use crate::ACTION_SIZE;
 use rayon::prelude::*;
 
-/// Sequences of one part of a batch. Fixed, so that sums have the same order with any number of threads; large enough for
-/// the matrix products to be worth their packing.
+/// Sequences of one part of a batch. Fixed, so that sums have the same order with any number of
+/// threads; large enough for the matrix products to be worth their packing.
 const PART: usize = 50;
 
-/// Sequences with the actions to learn. `observations`: (sequences, steps, inputs); `actions`: (sequences, steps, 7).
+/// Sequences with the actions to learn. `observations`: (sequences, steps, inputs); `actions`:
+/// (sequences, steps, 7).
 #[derive(Clone, Copy)]
 pub struct Batch<'a> {
     /// Number of sequences.
@@ -40,7 +41,8 @@ struct Part {
     /// (T B, outputs) of each layer with ReLU.
     mlp: Vec<Vec<f32>>,
     heads: Vec<Vec<f32>>,
-    /// Gradients of what the heads, or the layer just done, were given; and a second one to write into.
+    /// Gradients of what the heads, or the layer just done, were given; and a second one to write
+    /// into.
     d_rows: Vec<f32>,
     d_next: Vec<f32>,
     loss: f64,
@@ -48,7 +50,8 @@ struct Part {
 }
 
 impl Workspace {
-    /// Gradients of the last [`Network::loss_and_gradient`], one vector per part: their sum, in this order, is the gradient.
+    /// Gradients of the last [`Network::loss_and_gradient`], one vector per part: their sum, in
+    /// this order, is the gradient.
     pub fn gradients(&self) -> Vec<&[f32]> {
         self.parts.iter().map(|p| &p.gradients[..]).collect()
     }

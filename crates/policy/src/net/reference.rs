@@ -1,5 +1,5 @@
-//! The slow twin of [`Network::loss`] in f64: one sequence, one step, one number after the other, straight from the formulas
-//! in `lstm.rs` and `head.rs`. Tests take central differences of it.
+//! The slow twin of [`Network::loss`] in f64: one sequence, one step, one number after the other,
+//! straight from the formulas in `lstm.rs` and `head.rs`. Tests take central differences of it.
 
 use super::{Batch, Head, Linear, Network};
 use crate::ACTION_SIZE;

@@ -1,6 +1,7 @@
 //! Where a training stands, in one safetensors file: weights, Adam's two means, the losses so far.
 //!
-//! Written to a temporary name and renamed. Sums are kept as bits, so that a resumed training is the same training.
+//! Written to a temporary name and renamed. Sums are kept as bits, so that a resumed training is
+//! the same training.
 
 use crate::PolicyError;
 use crate::net::{Adam, Network};

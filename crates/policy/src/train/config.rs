@@ -34,7 +34,8 @@ pub struct TrainConfig {
     pub final_learning_rate: f64,
     /// Steps of a window, and of a rollout before the hidden state is forgotten.
     pub seq_length: usize,
-    /// Shift and scale every observed number to mean 0 and deviation 1 over the training demonstrations.
+    /// Shift and scale every observed number to mean 0 and deviation 1 over the training
+    /// demonstrations.
     pub normalize_obs: bool,
     /// Observations that the policy sees.
     pub obs: Vec<String>,
@@ -48,7 +49,8 @@ pub struct TrainConfig {
     pub validate_every: usize,
     /// Steps between two checkpoints.
     pub checkpoint_every: usize,
-    /// Steps between two policies kept in snapshots/; 0 = none. Likelihood is no guide to success: roll them out.
+    /// Steps between two policies kept in snapshots/; 0 = none. Likelihood is no guide to success:
+    /// roll them out.
     pub snapshot_every: usize,
     /// Shape of the network.
     pub net: NetConfig,
@@ -97,7 +99,8 @@ impl TrainConfig {
             Preset::BcRnnFast => Self {
                 steps: 6000,
                 learning_rate: 1e-3,
-                // A rate that falls lets the last iterate be as good as any before: no choosing by success.
+                // A rate that falls lets the last iterate be as good as any before: no choosing by
+                // success.
                 final_learning_rate: 2e-5,
                 normalize_obs: true,
                 validate_every: 500,

@@ -1,4 +1,5 @@
-//! Windows of demonstrations: one from every step, its end repeated where the demonstration is over.
+//! Windows of demonstrations: one from every step, its end repeated where the demonstration is
+//! over.
 //!
 //! As robomimic's `SequenceDataset` with pad_seq_length: the padded steps count like any other.
 
@@ -41,7 +42,8 @@ impl Dataset {
     /// Joins the wanted observations into rows, normalises them, and splits the demonstrations.
     ///
     /// # Errors
-    /// An observation that the demonstrations lack, actions outside [-1, 1], masks without demonstrations.
+    /// An observation that the demonstrations lack, actions outside [-1, 1], masks without
+    /// demonstrations.
     pub fn new(demos: &Demos, config: &TrainConfig) -> Result<Self, PolicyError> {
         let Some(first) = demos.episodes.first() else {
             let hint = "record some: hingecast demos";

@@ -6,9 +6,10 @@
 //! folder/snapshots/step_<n>/      policies on the way, if asked for
 //! folder/policy.{safetensors,json}   the last iterate, when all steps are done
 //! ```
-//! Every pass through the windows has an order of its own, drawn from the seed and the pass; what is left of a pass when
-//! no whole batch fits is dropped, as PyTorch's DataLoader does with drop_last. So the k-th batch follows from seed and k
-//! alone, and a resumed training takes the same steps as one that was never stopped: same bytes.
+//! Every pass through the windows has an order of its own, drawn from the seed and the pass; what
+//! is left of a pass when no whole batch fits is dropped, as PyTorch's DataLoader does with
+//! drop_last. So the k-th batch follows from seed and k alone, and a resumed training takes the
+//! same steps as one that was never stopped: same bytes.
 
 mod checkpoint;
 mod config;
@@ -56,11 +57,12 @@ impl TrainReport {
     }
 }
 
-/// Trains into `folder`, or goes on there. Runs on the calling thread's rayon pool; its size does not change a bit.
+/// Trains into `folder`, or goes on there. Runs on the calling thread's rayon pool; its size does
+/// not change a bit.
 ///
 /// # Errors
-/// Settings or demonstrations that cannot be learnt from, a loss that is no longer finite, a folder that cannot be written,
-/// or the wish to stop: then the work so far is in the checkpoint.
+/// Settings or demonstrations that cannot be learnt from, a loss that is no longer finite, a folder
+/// that cannot be written, or the wish to stop: then the work so far is in the checkpoint.
 pub fn train(
     demos: &Demos,
     config: &TrainConfig,
@@ -144,7 +146,8 @@ pub fn train(
     })
 }
 
-/// What a checkpoint belongs to. With a constant rate more steps are the same training gone further.
+/// What a checkpoint belongs to. With a constant rate more steps are the same training gone
+/// further.
 fn stamp(config: &TrainConfig, data: &Dataset) -> String {
     let mut config = config.clone();
     if config.final_learning_rate == config.learning_rate {

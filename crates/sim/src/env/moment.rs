@@ -1,10 +1,12 @@
-//! Moments of an episode that can be gone back to: what tele-operation undoes. Everything that the next step depends on is kept, the
-//! solver's warm start too, so going on from a moment gives the bits that going on the first time gave.
+//! Moments of an episode that can be gone back to: what tele-operation undoes. Everything that the
+//! next step depends on is kept, the solver's warm start too, so going on from a moment gives the
+//! bits that going on the first time gave.
 
 use super::Env;
 use mujoco_rs::prelude::*;
 
-/// All that the next step of physics reads: time, positions, velocities, actuation, controls, warm start, mocap bodies.
+/// All that the next step of physics reads: time, positions, velocities, actuation, controls, warm
+/// start, mocap bodies.
 const PHYSICS: u32 = MjtState::mjSTATE_INTEGRATION as u32;
 
 /// All that going on from one instant of an episode needs.

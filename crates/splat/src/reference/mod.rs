@@ -1,8 +1,9 @@
 //! The slow, obvious twin of the engine: one gaussian, one pixel at a time, f64, textbook formulas.
 //!
-//! The tests hold every fast kernel against it and hold its gradients against central differences; the speed bench
-//! measures against it. It is the per-pixel loop of the CUDA rasteriser of 3D Gaussian Splatting (Kerbl et al. 2023):
-//! depth-sorted lists per 16 x 16 tile, front to back forward, back to front backward.
+//! The tests hold every fast kernel against it and hold its gradients against central differences;
+//! the speed bench measures against it. It is the per-pixel loop of the CUDA rasteriser of 3D
+//! Gaussian Splatting (Kerbl et al. 2023): depth-sorted lists per 16 x 16 tile, front to back
+//! forward, back to front backward.
 
 mod loss;
 mod project;
@@ -199,7 +200,8 @@ pub fn backward(scene: &Scene, image: &Image, pixels: &PixelGradient) -> SceneGr
     out
 }
 
-/// Back to front: `behind` is the colour (and depth, alpha ...) gathered behind the current gaussian, dotted with dL/d pixel.
+/// Back to front: `behind` is the colour (and depth, alpha ...) gathered behind the current
+/// gaussian, dotted with dL/d pixel.
 fn pixel_backward(
     scene: &Scene,
     image: &Image,

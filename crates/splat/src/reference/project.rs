@@ -201,8 +201,8 @@ pub(super) fn backward(
     }
     out.quats[i] = quat_backward(quat(scene, i), &d_rot);
 
-    // Twist exp(v, w) on the left of world_from_group: x -> x + v + w x x, S -> S + [w] S - S [w], and the direction in the
-    // group's frame changes as if the camera had moved the other way.
+    // Twist exp(v, w) on the left of world_from_group: x -> x + v + w x x, S -> S + [w] S - S [w],
+    // and the direction in the group's frame changes as if the camera had moved the other way.
     let group = scene.groups.get(i).map_or(0, |&g| usize::from(g));
     let turn = world.mean.cross(d_mean_by_screen) + camera.centre().cross(d_direction_world);
     for axis in 0..3 {
@@ -214,7 +214,8 @@ pub(super) fn backward(
     }
 }
 
-/// dL/d(raw quaternion) from dL/d(rotation matrix): derivatives of the matrix entries, then of the normalisation.
+/// dL/d(raw quaternion) from dL/d(rotation matrix): derivatives of the matrix entries, then of the
+/// normalisation.
 fn quat_backward(raw: DQuat, d: &DMat3) -> [Real; 4] {
     let norm = raw.length();
     let q = raw / norm;

@@ -1,6 +1,7 @@
 //! AVX2 + FMA: eight lanes.
 //!
-//! Safety: values of this type are only made inside kernels that `kernels.rs` hands out after the CPU was asked.
+//! Safety: values of this type are only made inside kernels that `kernels.rs` hands out after the
+//! CPU was asked.
 
 use super::{EXP2_ROUND, LOG2_SERIES, Lanes};
 use core::arch::x86_64::*;

@@ -1,6 +1,7 @@
 //! AVX-512 (F, VL, DQ, BW): sixteen lanes.
 //!
-//! Safety: values of this type are only made inside kernels that `kernels.rs` hands out after the CPU was asked.
+//! Safety: values of this type are only made inside kernels that `kernels.rs` hands out after the
+//! CPU was asked.
 
 use super::{LOG2_SERIES, Lanes};
 use core::arch::x86_64::*;
@@ -96,7 +97,8 @@ impl Lanes for Avx512 {
     #[inline(always)]
     fn exp2(self) -> Self {
         unsafe {
-            // scalef into the denormal range costs a microcode assist per vector: twice the time of the whole kernel.
+            // scalef into the denormal range costs a microcode assist per vector: twice the time of
+            // the whole kernel.
             let x = _mm512_max_ps(self.0, _mm512_set1_ps(-64.0));
             let f = _mm512_reduce_ps::<0x09>(x); // x - floor(x)
             let mut p = _mm512_set1_ps(EXP2_FLOOR[5]);
@@ -140,7 +142,8 @@ impl Lanes for Avx512 {
     }
 }
 
-/// Ten lane sums by one tree of shuffles: fold halves, fold quarters, then transpose-and-add inside 128-bit lanes.
+/// Ten lane sums by one tree of shuffles: fold halves, fold quarters, then transpose-and-add inside
+/// 128-bit lanes.
 #[inline(always)]
 unsafe fn sum_tree(a: &[Avx512; 10]) -> __m512 {
     unsafe {
@@ -160,7 +163,8 @@ unsafe fn sum_tree(a: &[Avx512; 10]) -> __m512 {
         let p2 = halves!(a[4].0, a[5].0);
         let p3 = halves!(a[6].0, a[7].0);
         let p4 = halves!(a[8].0, a[9].0);
-        // Each 128-bit lane of q holds four partial sums of one input: q0 = inputs 0..4, q1 = 4..8, q2 = 8, 9, 0, 0.
+        // Each 128-bit lane of q holds four partial sums of one input: q0 = inputs 0..4, q1 = 4..8,
+        // q2 = 8, 9, 0, 0.
         let q0 = quarters!(p0, p1);
         let q1 = quarters!(p2, p3);
         let q2 = quarters!(p4, zero);

@@ -1,8 +1,9 @@
 //! One small vector trait, three implementations: AVX-512, AVX2+FMA, plain arrays.
 //!
 //! Kernels are written once, generic over [`Lanes`], and compiled once per implementation inside a
-//! `#[target_feature]` wrapper (see `kernels.rs`). Everything here is `inline(always)`: a call that is not inlined, a
-//! closure or an array `map` would be compiled without the feature and turn each operation into a function call.
+//! `#[target_feature]` wrapper (see `kernels.rs`). Everything here is `inline(always)`: a call that
+//! is not inlined, a closure or an array `map` would be compiled without the feature and turn each
+//! operation into a function call.
 
 #[cfg(target_arch = "x86_64")]
 mod avx2;

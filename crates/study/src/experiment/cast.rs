@@ -113,7 +113,8 @@ impl Cast<'_> {
                 }
             };
             rows.push(match made {
-                // Another policy and another task: its episodes are no pairs with those of the first.
+                // Another policy and another task: its episodes are no pairs with those of the
+                // first.
                 Ok((episodes, error)) => {
                     let pairs = (*world != World::Back).then_some(first.as_slice());
                     Row::measured(self.name, name, error, &episodes, pairs)
@@ -249,7 +250,8 @@ impl Cast<'_> {
         Ok(trained)
     }
 
-    /// Episodes of every policy on `model`, and how wrong its joint is. Pictures of the first policy's ends lie beside.
+    /// Episodes of every policy on `model`, and how wrong its joint is. Pictures of the first
+    /// policy's ends lie beside.
     fn world(
         &mut self,
         name: &str,

@@ -1,9 +1,10 @@
-//! The question that a twin must answer: does a policy that was made with one of the two work on the other, and how wrong may a
-//! twin be before it does not?
+//! The question that a twin must answer: does a policy that was made with one of the two work on
+//! the other, and how wrong may a twin be before it does not?
 //!
-//! For every object: a policy cloned from demonstrations on the true object acts on that object, on its twins and on spoiled
-//! objects, the same seeds everywhere; and back, a policy from demonstrations on the twin acts on the true object. Here are the
-//! rows that this gives; `steps` remembers what is finished, `table` and `plot` show it, the verb `experiment` runs the stages.
+//! For every object: a policy cloned from demonstrations on the true object acts on that object, on
+//! its twins and on spoiled objects, the same seeds everywhere; and back, a policy from
+//! demonstrations on the twin acts on the true object. Here are the rows that this gives; `steps`
+//! remembers what is finished, `table` and `plot` show it, the verb `experiment` runs the stages.
 
 pub mod cast;
 pub mod plan;
@@ -52,11 +53,14 @@ impl World {
 /// How far a world's joint is from the true one, whatever any policy does.
 #[derive(Clone, Copy, Debug, Serialize)]
 pub struct TwinError {
-    /// Between the axes, both pointing so that positive motion opens, degrees: a hinge on the wrong side has 180.
+    /// Between the axes, both pointing so that positive motion opens, degrees: a hinge on the wrong
+    /// side has 180.
     pub axis_deg: f64,
-    /// From the foot of the spot on the true axis to this world's axis, simulated mm; `None` for slides.
+    /// From the foot of the spot on the true axis to this world's axis, simulated mm; `None` for
+    /// slides.
     pub pivot_mm: Option<f64>,
-    /// Between the spots where this world's joint and the true one have moved as far as the task asks, simulated mm.
+    /// Between the spots where this world's joint and the true one have moved as far as the task
+    /// asks, simulated mm.
     pub goal_mm: f64,
 }
 
@@ -76,7 +80,8 @@ impl TwinError {
 #[derive(Clone, Debug, Serialize)]
 pub struct Count {
     pub successes: usize,
-    /// Wilson's 95 % interval. It takes all episodes as independent; `per_seed` shows how far training seeds differ.
+    /// Wilson's 95 % interval. It takes all episodes as independent; `per_seed` shows how far
+    /// training seeds differ.
     pub interval: [f64; 2],
     /// The true object's rate minus this one's, same policies and episodes.
     pub against_true: Option<Comparison>,
@@ -120,7 +125,8 @@ impl Row {
         }
     }
 
-    /// `episodes[k]`: those of the policy of training seed k. `truth`: the same policies on the true object, at least as many episodes.
+    /// `episodes[k]`: those of the policy of training seed k. `truth`: the same policies on the
+    /// true object, at least as many episodes.
     pub fn measured(
         object: &str,
         world: &str,

@@ -12,7 +12,8 @@ use std::path::PathBuf;
 const WORLDS: [&str; 11] =
     ["twin", "track", "axis=3", "axis=10", "axis=30", "pivot=3", "pivot=10", "pivot=30", "limits=0.5", "edge", "back"];
 
-/// What an experiment is asked for, resolved before the first step: a typing error must not wait an hour.
+/// What an experiment is asked for, resolved before the first step: a typing error must not wait an
+/// hour.
 pub struct Plan {
     /// Name and meaning of every world besides the true object.
     pub worlds: Vec<(String, World)>,

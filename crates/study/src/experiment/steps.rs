@@ -1,7 +1,8 @@
 //! What is finished of an experiment, and how long the rest may take.
 //!
-//! A step's stamp is a hash of its settings and of the stamps of the steps whose output it reads. Same stamp, and its output is there:
-//! it is skipped. So the same command goes on after a kill, and a changed setting redoes what depends on it and nothing else.
+//! A step's stamp is a hash of its settings and of the stamps of the steps whose output it reads.
+//! Same stamp, and its output is there: it is skipped. So the same command goes on after a kill,
+//! and a changed setting redoes what depends on it and nothing else.
 
 use hingecast::failure::Result;
 use hingecast::stage::{erased, read_json, stamp, write_json};

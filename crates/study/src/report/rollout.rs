@@ -1,5 +1,5 @@
-//! `index.html` of a rollout: doubts first, then rates, paired differences, how episodes ended and pictures of each end. One folder,
-//! no network.
+//! `index.html` of a rollout: doubts first, then rates, paired differences, how episodes ended and
+//! pictures of each end. One folder, no network.
 
 use super::rollout_plot;
 use crate::simulate::record::outcome_name;

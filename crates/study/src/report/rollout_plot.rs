@@ -1,4 +1,5 @@
-//! Plots of a rollout as SVG: a rate with its interval, and how many episodes have succeeded by when.
+//! Plots of a rollout as SVG: a rate with its interval, and how many episodes have succeeded by
+//! when.
 
 use crate::simulate::rollout::{STEP_SECS, WorldResult};
 use hingecast::chart::{color, dot, legend, svg};
@@ -24,7 +25,8 @@ pub(super) fn interval(rate: f64, [lo, hi]: [f64; 2]) -> String {
     )
 }
 
-/// Share of all episodes that have succeeded by a time, a line a world; a little farther than the last success.
+/// Share of all episodes that have succeeded by a time, a line a world; a little farther than the
+/// last success.
 pub(super) fn success_over_time(results: &[WorldResult], horizon: usize) -> String {
     let last = results.iter().flat_map(|r| &r.results).filter(|e| e.won()).map(|e| e.steps).max();
     let until = last.map_or(horizon, |steps| (steps + steps / 4).min(horizon));

@@ -1,7 +1,8 @@
-//! Demonstrations by the scripted expert: episodes in parallel, successes kept, the same file for any number of threads.
+//! Demonstrations by the scripted expert: episodes in parallel, successes kept, the same file for
+//! any number of threads.
 //!
-//! Attempt k has the seed `seed * 2^20 + k`. Attempts are made in blocks of a fixed size and looked at in order; the first `n`
-//! successes are kept. So which thread made an attempt cannot matter.
+//! Attempt k has the seed `seed * 2^20 + k`. Attempts are made in blocks of a fixed size and looked
+//! at in order; the first `n` successes are kept. So which thread made an attempt cannot matter.
 
 use hingecast::failure::{Failure, Result};
 use hingecast_geom::Progress;

@@ -1,4 +1,5 @@
-//! What is in a file of demonstrations: a list, a plot, and a replay that must reproduce the recorded states to the bit.
+//! What is in a file of demonstrations: a list, a plot, and a replay that must reproduce the
+//! recorded states to the bit.
 
 use super::record::WorldArgs;
 use hingecast::chart::svg;

@@ -1,8 +1,10 @@
-//! A policy in seeded episodes on several worlds: the true object, its twin, spoiled ones. Episode k has the same seed everywhere,
-//! so worlds are compared in pairs (McNemar's exact test, `policy::statistics`).
+//! A policy in seeded episodes on several worlds: the true object, its twin, spoiled ones. Episode
+//! k has the same seed everywhere, so worlds are compared in pairs (McNemar's exact test,
+//! `policy::statistics`).
 //!
-//! Two things are counted. *Success*: the joint moved as far as the task asks, half of the true range. *As true*: the part ended where the
-//! joint of the first world (the true object) would have it (`sim::path`): a compliant arm opens many a wrong hinge.
+//! Two things are counted. *Success*: the joint moved as far as the task asks, half of the true
+//! range. *As true*: the part ended where the joint of the first world (the true object) would have
+//! it (`sim::path`): a compliant arm opens many a wrong hinge.
 
 use super::record::{ENV_NAME, episode_seed, outcome_name};
 use super::strip;
@@ -41,7 +43,8 @@ pub struct EpisodeResult {
     pub moved: f64,
     /// Where the grasped spot of the part was at the end, world frame, m.
     pub end: [f64; 3],
-    /// How far it was from the way on which the true joint leads it, mm; `None` when the simulation diverged.
+    /// How far it was from the way on which the true joint leads it, mm; `None` when the simulation
+    /// diverged.
     pub off_mm: Option<f64>,
     /// That is little: the part ended as the true one would.
     pub as_true: bool,
@@ -73,8 +76,8 @@ pub struct WorldResult {
     pub median_secs_to_success: Option<f64>,
     /// Mean over all episodes, share of the true range: wrong limits cannot hide behind it.
     pub mean_moved: f64,
-    /// Median distance of the grasped spot from where it ended in the first world, same seed, both successes, mm. A compliant arm
-    /// opens many a wrong hinge; where the part then is tells it.
+    /// Median distance of the grasped spot from where it ended in the first world, same seed, both
+    /// successes, mm. A compliant arm opens many a wrong hinge; where the part then is tells it.
     pub end_gap_mm: Option<f64>,
     /// Against the first world: its rate minus this one's.
     pub against_first: Option<Comparison>,
@@ -106,7 +109,8 @@ pub fn rollout(
     Ok(out)
 }
 
-/// `n` episodes in one world; `truth` is the true joint's way, and `report` hears after each how many are finished.
+/// `n` episodes in one world; `truth` is the true joint's way, and `report` hears after each how
+/// many are finished.
 ///
 /// # Errors
 /// When the policy wants other observations than this world has, or `report` says to stop.
@@ -134,7 +138,8 @@ pub fn episodes(
         .collect()
 }
 
-/// The success rate of the policy in `folder` in the world that its demonstrations were recorded in: a sweep's score.
+/// The success rate of the policy in `folder` in the world that its demonstrations were recorded
+/// in: a sweep's score.
 ///
 /// # Errors
 /// Those of [`rollout`].
@@ -323,7 +328,8 @@ pub fn world_of_policy(folder: &Path) -> Result<Option<super::record::WorldArgs>
         Failure::new(format!("not what `train` writes: {e}"), path.display().to_string(), "delete it, or train again")
     };
     let value: serde_json::Value = serde_json::from_slice(&bytes).map_err(damaged)?;
-    // Demonstrations of another simulator have other arguments: then the task comes from the object.
+    // Demonstrations of another simulator have other arguments: then the task comes from the
+    // object.
     if !value["env_name"].as_str().is_some_and(|name| name.starts_with(ENV_NAME)) {
         return Ok(None);
     }

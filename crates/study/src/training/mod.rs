@@ -1,4 +1,5 @@
-//! Policies from demonstrations: one training with its settings and loss plot, and sweeps over settings.
+//! Policies from demonstrations: one training with its settings and loss plot, and sweeps over
+//! settings.
 
 mod plot;
 pub mod sweep;
@@ -23,8 +24,8 @@ pub fn resolve(preset: Preset, file: Option<&Path>, set: &[String]) -> Result<Tr
     Ok(config)
 }
 
-/// Whether a training may write into `folder`: it is new, empty, or one of ours. A training of other settings begins by removing
-/// what is there.
+/// Whether a training may write into `folder`: it is new, empty, or one of ours. A training of
+/// other settings begins by removing what is there.
 ///
 /// # Errors
 /// The folder holds something else.

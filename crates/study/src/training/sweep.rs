@@ -1,4 +1,5 @@
-//! The same demonstrations with many settings: a grid, or random draws; several trainings at a time, each as it would be alone.
+//! The same demonstrations with many settings: a grid, or random draws; several trainings at a
+//! time, each as it would be alone.
 //!
 //! ```toml
 //! mode = "grid"                 # or "random"
@@ -9,7 +10,8 @@
 //! "net.rnn_hidden" = [100, 400]
 //! "net.min_std" = { min = 1e-4, max = 1e-1, log = true }     # random only
 //! ```
-//! Every combination has a folder named after it, so that the same command resumes, and a changed file keeps what it shares.
+//! Every combination has a folder named after it, so that the same command resumes, and a changed
+//! file keeps what it shares.
 
 use super::{plot, resolve, train};
 use hingecast::failure::{Failure, Result};
@@ -25,7 +27,8 @@ use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 use std::sync::{Arc, Mutex};
 
-/// The success rate, 0 to 1, of the policy in a folder. Asked again when the sweep runs again: keep results that cost time.
+/// The success rate, 0 to 1, of the policy in a folder. Asked again when the sweep runs again: keep
+/// results that cost time.
 pub type Score = dyn Fn(&Path) -> Result<f64> + Sync;
 
 /// A sweep's combinations may not fill a disk by mistake.
@@ -186,12 +189,14 @@ fn folder_name(settings: &BTreeMap<String, toml::Value>) -> String {
     if name.len() <= 150 { name } else { format!("{}-{}", &name[..110], hingecast::stage::stamp(&[&name])) }
 }
 
-/// Runs the sweep into `out`: a folder per combination, then `sweep.json`, `sweep.md` and `sweep_<setting>.svg`. Answers the rows, best
-/// first: by success where `score` gives it (the success rate of the policy in this folder), else by validation loss.
-/// Likelihood is no guide to success, so a sweep without `score` says which settings fit, not which succeed.
+/// Runs the sweep into `out`: a folder per combination, then `sweep.json`, `sweep.md` and
+/// `sweep_<setting>.svg`. Answers the rows, best first: by success where `score` gives it (the
+/// success rate of the policy in this folder), else by validation loss. Likelihood is no guide to
+/// success, so a sweep without `score` says which settings fit, not which succeed.
 ///
 /// # Errors
-/// Settings that do not exist, disk trouble, Ctrl-C. A training that diverges is a row of the table, not an error.
+/// Settings that do not exist, disk trouble, Ctrl-C. A training that diverges is a row of the
+/// table, not an error.
 pub fn run(
     sweep: &Sweep,
     preset: Preset,
@@ -203,7 +208,8 @@ pub fn run(
     progress: &Progress,
     score: Option<&Score>,
 ) -> Result<Vec<Row>> {
-    // All settings are resolved before the first training begins: a typing error must not wait an hour.
+    // All settings are resolved before the first training begins: a typing error must not wait an
+    // hour.
     let mut jobs = Vec::new();
     for settings in sweep.combinations() {
         let pairs = set.iter().cloned().chain(settings.iter().map(|(key, value)| format!("{key}={value}")));
@@ -244,7 +250,8 @@ pub fn run(
     Ok(rows)
 }
 
-/// What one training reports counts for the whole; when the person wants to stop, every training hears it.
+/// What one training reports counts for the whole; when the person wants to stop, every training
+/// hears it.
 fn share_of(progress: &Progress, done: &Arc<Vec<AtomicUsize>>, i: usize, total: usize) -> Progress {
     let cancel = Arc::new(AtomicBool::new(false));
     let (flag, done, progress) = (cancel.clone(), done.clone(), progress.clone());
@@ -329,7 +336,8 @@ fn write(rows: &[Row], out: &Path) -> Result<()> {
     Ok(())
 }
 
-/// Score against one setting: numbers on a line, logarithmic where they span a decade; words in a row.
+/// Score against one setting: numbers on a line, logarithmic where they span a decade; words in a
+/// row.
 fn plot_of(rows: &[Row], key: &str) -> String {
     let (name, score): (&str, fn(&Row) -> Option<f64>) = match rows.iter().any(|row| row.success.is_some()) {
         true => ("success rate", |row| row.success),
@@ -424,7 +432,8 @@ mod tests {
         Demos { episodes: (0..12).map(episode).collect(), ..Default::default() }
     }
 
-    /// Two at a time, ranked by what the closure says; one that cannot be trained is a row; once more changes nothing.
+    /// Two at a time, ranked by what the closure says; one that cannot be trained is a row; once
+    /// more changes nothing.
     #[test]
     fn a_sweep_trains_scores_and_resumes() {
         let dir = tempfile::tempdir().unwrap();

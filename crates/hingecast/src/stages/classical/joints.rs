@@ -27,7 +27,8 @@ pub fn run(inputs: &Inputs, splats: &Splats, groups: &Groups, progress: &Progres
                 [0.03, 0.03, 0.02, 0.02, 0.01, 0.01, 0.01, 0.005, 0.005, 0.005].map(|g| g * diagonal).to_vec();
             let start = parts.motions[part][state];
             let (pose, report) = icp::align(points, normals, &target, start, &gates);
-            // ICP may lose its way where little of the part is in sight: then the tracks have the last word.
+            // ICP may lose its way where little of the part is in sight: then the tracks have the
+            // last word.
             let strayed = (pose.inverse() * start).angle() > 0.2 || report.inliers < 0.15;
             if !strayed {
                 parts.motions[part][state] = pose;

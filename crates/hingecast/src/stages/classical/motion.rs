@@ -1,5 +1,5 @@
-//! Stage `motion`: the gaussians of the first state carried through all states. One file per state, so that a
-//! killed run goes on at the state where it stopped.
+//! Stage `motion`: the gaussians of the first state carried through all states. One file per state,
+//! so that a killed run goes on at the state where it stopped.
 
 use crate::artifacts::Splats;
 use crate::artifacts::tracks::{read_states, save_state};

@@ -1,14 +1,16 @@
-//! From keys and time to actions. Knows no terminal: events come in with their time, actions and commands go out.
+//! From keys and time to actions. Knows no terminal: events come in with their time, actions and
+//! commands go out.
 //!
-//! A terminal tells when a key goes down and repeats it while it is held; few tell when it goes up (the kitty protocol does). So a
-//! motion lasts for [`HOLD`] after each event of its key, or until the release where releases are told. World frame, as the picture
-//! shows it: x to the right (away from the arm), y into the picture, z up.
+//! A terminal tells when a key goes down and repeats it while it is held; few tell when it goes up
+//! (the kitty protocol does). So a motion lasts for [`HOLD`] after each event of its key, or until
+//! the release where releases are told. World frame, as the picture shows it: x to the right (away
+//! from the arm), y into the picture, z up.
 
 use hingecast_sim::env::ACTION;
 use std::time::Duration;
 
-/// How long a key counts as held after an event: longer than the gap between two repeats (30 to 50 ms, more over a network), short
-/// enough that a tap is a nudge of three steps.
+/// How long a key counts as held after an event: longer than the gap between two repeats (30 to 50
+/// ms, more over a network), short enough that a tap is a nudge of three steps.
 pub const HOLD: Duration = Duration::from_millis(150);
 /// Shares of full speed that can be chosen.
 const SPEEDS: [f64; 6] = [0.1, 0.2, 0.35, 0.5, 0.7, 1.0];

@@ -1,8 +1,10 @@
-//! Demonstrations by a person at the keyboard, 20 control steps a second, into the same file as scripted ones.
+//! Demonstrations by a person at the keyboard, 20 control steps a second, into the same file as
+//! scripted ones.
 //!
-//! `keys` turns key events and time into actions, `session` drives the world and the recording, `screen` draws as text, `terminal`
-//! connects them with a real terminal. A kept episode is in the file before the next one begins, so a kill costs at most the
-//! episode being recorded; the same command goes on with the file.
+//! `keys` turns key events and time into actions, `session` drives the world and the recording,
+//! `screen` draws as text, `terminal` connects them with a real terminal. A kept episode is in the
+//! file before the next one begins, so a kill costs at most the episode being recorded; the same
+//! command goes on with the file.
 
 pub mod keys;
 pub mod screen;

@@ -1,4 +1,5 @@
-//! What stands on the terminal, as text with ANSI's codes: pictures in half blocks, two pixels a character, and the status lines.
+//! What stands on the terminal, as text with ANSI's codes: pictures in half blocks, two pixels a
+//! character, and the status lines.
 
 use super::session::Status;
 use std::fmt::Write as _;
@@ -7,14 +8,14 @@ use std::fmt::Write as _;
 pub const LINES: usize = 6;
 /// The pictures never get larger, characters: a ray a pixel has its price.
 const LARGEST: [usize; 2] = [160, 40];
-/// A character is about twice as high as wide, so its two halves are square. Both pictures together are at most so wide for their
-/// height.
+/// A character is about twice as high as wide, so its two halves are square. Both pictures together
+/// are at most so wide for their height.
 const ASPECT: f64 = 2.4;
 /// Share of the width that the left picture gets.
 const LEFT: f64 = 0.6;
 
-/// Sizes in pixels on a terminal of `columns` x `rows` characters: widths of the left and the right picture, and their height.
-/// `None` where nothing fits.
+/// Sizes in pixels on a terminal of `columns` x `rows` characters: widths of the left and the right
+/// picture, and their height. `None` where nothing fits.
 pub fn picture_sizes(columns: usize, rows: usize) -> Option<([usize; 2], usize)> {
     let height = 2 * rows.checked_sub(LINES)?.min(LARGEST[1]);
     let width = columns.min(LARGEST[0]).min((ASPECT * height as f64) as usize);
@@ -28,8 +29,8 @@ pub fn beside(left: &[u8], right: &[u8], widths: [usize; 2]) -> Vec<u8> {
     rows.flat_map(|(a, b)| [a, &[0; 3], b].concat()).collect()
 }
 
-/// RGB pixels as half blocks: the upper pixel is the character's colour, the lower its background. Colours are only said when they
-/// change.
+/// RGB pixels as half blocks: the upper pixel is the character's colour, the lower its background.
+/// Colours are only said when they change.
 pub fn half_blocks(rgb: &[u8], width: usize) -> String {
     let mut out = String::new();
     for rows in rgb.chunks_exact(6 * width) {

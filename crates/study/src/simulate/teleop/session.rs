@@ -1,9 +1,11 @@
-//! A session of tele-operation: the world under the person's keys, an episode being recorded, the ones that were kept. Knows no
-//! terminal and no file; time comes in from outside, so a list of key events and times is a session.
+//! A session of tele-operation: the world under the person's keys, an episode being recorded, the
+//! ones that were kept. Knows no terminal and no file; time comes in from outside, so a list of key
+//! events and times is a session.
 //!
-//! Nothing is recorded until the person asks for it: then the world begins anew from the episode's seed. It waits until the first key
-//! moves the hand, so that no episode begins with a person who thinks. Success ends an episode and keeps it, as in scripted
-//! demonstrations. Undo goes back one second: the world to that moment, the recording to that step.
+//! Nothing is recorded until the person asks for it: then the world begins anew from the episode's
+//! seed. It waits until the first key moves the hand, so that no episode begins with a person who
+//! thinks. Success ends an episode and keeps it, as in scripted demonstrations. Undo goes back one
+//! second: the world to that moment, the recording to that step.
 
 use super::keys::{Command, Key, Keyboard, Stroke};
 use crate::simulate::record::{Tape, WorldArgs, env_args, episode_seed, masks};

@@ -1,7 +1,9 @@
-//! The terminal of a tele-operation: keys in, pictures out, a control step every 50 ms whatever the picture costs.
+//! The terminal of a tele-operation: keys in, pictures out, a control step every 50 ms whatever the
+//! picture costs.
 //!
-//! Pictures are made and written by a thread of their own, always of the newest state; a slow terminal or a large picture costs
-//! pictures, never control steps. Everything is drawn on stderr: stdout is for `--json`.
+//! Pictures are made and written by a thread of their own, always of the newest state; a slow
+//! terminal or a large picture costs pictures, never control steps. Everything is drawn on stderr:
+//! stdout is for `--json`.
 
 use super::keys::{Command, Key, Stroke};
 use super::screen;
@@ -91,7 +93,8 @@ impl Drop for Console {
     }
 }
 
-/// Drives `session` until the person quits or `wanted` episodes are kept; `save` is called whenever the kept ones changed.
+/// Drives `session` until the person quits or `wanted` episodes are kept; `save` is called whenever
+/// the kept ones changed.
 ///
 /// # Errors
 /// When saving fails, or the person presses Ctrl-C.
@@ -157,8 +160,8 @@ fn control(
     Ok(pace)
 }
 
-/// Terminal events from a thread of their own: of a terminal that hung up crossterm reads nothing for ever, and the control loop has to
-/// notice the hang-up's signal all the same.
+/// Terminal events from a thread of their own: of a terminal that hung up crossterm reads nothing
+/// for ever, and the control loop has to notice the hang-up's signal all the same.
 struct Events {
     receiver: Receiver<std::io::Result<Event>>,
     /// The thread ends with it.
