@@ -18,7 +18,7 @@ pub struct Config {
     /// Seed of everything random: the same seed, the same bytes.
     #[serde(skip)]
     pub seed: u64,
-    /// Names of passes (see [`PASSES`](crate::passes::PASSES)) that are left out, to see what each
+    /// Names of passes (see [`crate::passes`]) that are left out, to see what each
     /// is worth.
     #[serde(skip)]
     pub skip: Vec<String>,

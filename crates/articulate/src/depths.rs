@@ -5,7 +5,7 @@ use crate::observe::depth_view::{DepthView, OBJECT};
 use glam::{DVec2, Vec3};
 
 /// Depth pictures of an object in several states: a recording on disk, or `Vec<Vec<DepthView>>` in
-/// memory ([state][view]).
+/// memory (`[state][view]`).
 pub trait Depths {
     /// Number of states.
     fn n_states(&self) -> usize;

@@ -33,7 +33,7 @@ pub struct Articulation {
     /// What the last fit knew.
     pub report: FitReport,
     /// What the depth says about the pose of every part (see [`crate::pictures`]); empty where
-    /// depth is so sharp that pictures have nothing to add. [state][part]
+    /// depth is so sharp that pictures have nothing to add. `[state][part]`
     pub information: Vec<Vec<Information>>,
     /// Of each joint, in the tree's order.
     pub certainty: Vec<Certainty>,

@@ -12,7 +12,7 @@ use glam::{IVec3, Vec3};
 use hingecast_geom::{Certainty, Joint};
 use std::collections::HashMap;
 
-/// Standard deviations worth mentioning: axis [deg], pivot [share of the object's extent].
+/// Standard deviations worth mentioning: axis `[deg]`, pivot [share of the object's extent].
 const LOOSE_AXIS_DEG: f64 = 1.0;
 const LOOSE_PIVOT_SHARE: f64 = 0.01;
 /// The covariance counts rows that share noise and correspondences as if they did not.

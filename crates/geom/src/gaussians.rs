@@ -21,7 +21,7 @@ pub struct Gaussians {
     pub opacities: Vec<f32>,
     /// Degree-0 colour coefficients f_dc. (n, 3)
     pub sh0: Vec<[f32; 3]>,
-    /// Degree-1 coefficients [basis y, z, x][rgb]; empty when the degree is 0. (n, 3, 3)
+    /// Degree-1 coefficients [basis y, z, x]`[rgb]`; empty when the degree is 0. (n, 3, 3)
     pub sh1: Vec<[[f32; 3]; 3]>,
 }
 

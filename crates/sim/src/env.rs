@@ -3,7 +3,7 @@
 //!
 //! A step of 50 ms is 25 steps of physics. On the first, the goal is set: x* = x + 0.05 a[0..3]
 //! (m), R* = exp(0.5 a[3..6]) R (rad), and the fingers' target moves by a tenth of its range
-//! towards closed (a[6] > 0) or open; then `control::torques` every 2 ms. Same scene, seed and
+//! towards closed (a`[6]` > 0) or open; then `control::torques` every 2 ms. Same scene, seed and
 //! actions: same states, to the bit.
 
 mod moment;

@@ -72,7 +72,7 @@ pub fn write(twin: &Twin, splats: Option<(&Gaussians, &[u8])>, dir: &Path) -> Re
     whole.finish().map_err(at(dir))
 }
 
-/// Whether a file of this path, from the twin folder, is one that [`write`] writes.
+/// Whether a file of this path, from the twin folder, is one that [`fn@write`] writes.
 pub fn is_ours(path: &Path) -> bool {
     let names: Option<Vec<&str>> = path.iter().map(|name| name.to_str()).collect();
     let part = |name: &str, ends: &[&str]| {

@@ -50,13 +50,13 @@ pub struct Neighbourhood {
     weight: Vec<f32>,
     /// (n, K) distances in the first state.
     rest: Vec<f32>,
-    /// Edges that end in gaussian i: reverse[start[i]..start[i+1]].
+    /// Edges that end in gaussian i: `reverse[start[i]..start[i+1]]`.
     start: Vec<u32>,
     reverse: Vec<u32>,
     inv_diagonal: f32,
     /// Unit quaternions of the previous state. (n)
     previous_quats: Vec<[f32; 4]>,
-    /// R_i,p^-1 (x_j - x_i)_p per edge, components apart. (n) x [x, y, z][K]
+    /// R_i,p^-1 (x_j - x_i)_p per edge, components apart. (n) x `[x, y, z][K]`
     previous_offsets: Vec<[[f32; K]; 3]>,
     edges: Vec<Edge>,
 }

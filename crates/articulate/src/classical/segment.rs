@@ -52,7 +52,7 @@ impl Default for Config {
 pub struct Segmentation {
     /// Part of each gaussian; part 0 moves least. (n)
     pub labels: Vec<u8>,
-    /// World at state s from world at state 0. [part][state]
+    /// World at state s from world at state 0. `[part][state]`
     pub motions: Vec<Vec<Pose>>,
     /// Mean silhouette per part count tried, for the report.
     pub silhouettes: Vec<(usize, f64)>,

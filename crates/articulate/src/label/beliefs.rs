@@ -10,14 +10,14 @@ pub struct Beliefs {
     n_parts: usize,
     /// Cell of the lattice -> row of `rows`; u32::MAX: no surface near.
     row_of: Vec<u32>,
-    /// Sum over the samples near a cell. [row][part]
+    /// Sum over the samples near a cell. `[row][part]`
     rows: Vec<f32>,
-    /// Their number. [row]
+    /// Their number. `[row]`
     counts: Vec<f32>,
 }
 
 impl Beliefs {
-    /// `costs`: [point][part].
+    /// `costs`: `[point][part]`.
     pub fn new(lattice: &Lattice, cloud: &Surface, costs: &[f32], n_parts: usize) -> Self {
         let (mut row_of, mut rows, mut counts) = (vec![u32::MAX; lattice.len()], Vec::new(), Vec::new());
         let mut own = vec![0.0; n_parts];

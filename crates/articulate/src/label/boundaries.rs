@@ -119,7 +119,7 @@ struct Here<'a> {
     labels: &'a [u8],
     /// State and its pictures.
     asked: &'a [(usize, Vec<Witness>)],
-    /// World at an asked state from world here. [part][asked]
+    /// World at an asked state from world here. `[part][asked]`
     there: Vec<Vec<Motion>>,
     same: f32,
 }

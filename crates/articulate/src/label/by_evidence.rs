@@ -27,7 +27,7 @@ const TURNS: usize = 4;
 /// confirmation -1).
 const HEARD: f32 = 4.0;
 
-/// The part of every point of every state's cloud. [state][point]
+/// The part of every point of every state's cloud. `[state][point]`
 pub fn label_clouds(evidence: &Evidence, tree: &KinematicTree, owners: &Owners) -> Vec<Vec<u8>> {
     let twins = coupled_pairs(evidence, tree, owners);
     let (n_states, n_parts) = (evidence.n_states(), tree.parts.len());

@@ -44,7 +44,7 @@ pub fn neighbours(cloud: &Surface) -> Vec<Near> {
     (0..cloud.points.len()).into_par_iter().map(of).collect()
 }
 
-/// Costs [point][part], smoothed. What a neighbour says against a part counts up to `most`: a rim
+/// Costs `[point][part]`, smoothed. What a neighbour says against a part counts up to `most`: a rim
 /// two samples wide is not its neighbours'.
 pub fn smooth(costs: &[f32], near: &[Near], n_parts: usize, most: f32) -> Vec<f32> {
     let mut costs = costs.to_vec();

@@ -11,7 +11,7 @@ use hingecast_geom::{KinematicTree, Pose};
 pub struct Discovery {
     /// Parts and joints.
     pub tree: KinematicTree,
-    /// Under every part, on every sample. [part][sample]
+    /// Under every part, on every sample. `[part][sample]`
     pub verdicts: Vec<Vec<Verdict>>,
     /// What a part has to be worth.
     pub cost: PartCost,
@@ -32,7 +32,7 @@ pub struct Estimate {
     pub tree: KinematicTree,
     /// Who owns which sample.
     pub owners: Owners,
-    /// Under every part, on every sample. [part][sample]
+    /// Under every part, on every sample. `[part][sample]`
     pub verdicts: Vec<Vec<Verdict>>,
     /// What a part has to be worth.
     pub cost: PartCost,
@@ -57,6 +57,6 @@ pub struct FitReport {
     pub rows: usize,
     /// Mean over all comparisons of r^2 / gate^2, 1 where no surface was found.
     pub cost: f64,
-    /// Standard deviations per joint: axis [rad], pivot [scene units], value (mean over states).
+    /// Standard deviations per joint: axis `[rad]`, pivot `[scene units]`, value (mean over states).
     pub sigmas: Vec<[f64; 3]>,
 }

@@ -9,13 +9,13 @@ pub fn poses_of(tree: &KinematicTree, part: usize, n_states: usize) -> Vec<Pose>
 }
 
 /// World at state `t` from world at state `a`, for something that moves with `poses` (world from
-/// canonical). [a][t]
+/// canonical). `[a][t]`
 pub fn state_to_state(poses: &[Pose]) -> Vec<Vec<Motion>> {
     let inverse: Vec<Pose> = poses.iter().map(Pose::inverse).collect();
     inverse.iter().map(|i| poses.iter().map(|p| Motion::from(*p * *i)).collect()).collect()
 }
 
-/// World at state t from world at state a, for every part. [part][a][t]
+/// World at state t from world at state a, for every part. `[part][a][t]`
 pub fn motions_of(tree: &KinematicTree, n_states: usize) -> Vec<Vec<Vec<Motion>>> {
     (0..tree.parts.len()).map(|p| state_to_state(&poses_of(tree, p, n_states))).collect()
 }

@@ -37,7 +37,7 @@ pub struct Evidence {
     pub spaces: Vec<Occupancy>,
     /// A subset of all clouds, state after state.
     pub samples: Vec<Sample>,
-    /// Nearest samples of the same state. [sample][NEIGHBOURS]
+    /// Nearest samples of the same state. `[sample][NEIGHBOURS]`
     pub neighbours: Vec<Vec<u32>>,
     /// Distance to the plane within which two measurements are the same surface, scene units.
     pub tolerance: f32,

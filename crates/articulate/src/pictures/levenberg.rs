@@ -27,7 +27,7 @@ const ROUNDS: usize = 12;
 const SETTLED: f64 = 0.5;
 
 /// Moves the joints of `tree` and the states' frames so that the engine's gaussians (group = part)
-/// look like the pictures, as far as the depth lets them. `information`: [state][part].
+/// look like the pictures, as far as the depth lets them. `information`: `[state][part]`.
 ///
 /// # Errors
 /// Those of the engine; the wish to stop.

@@ -31,7 +31,7 @@ pub struct Shot {
 /// Everything that does not change from step to step.
 pub(super) struct Problem<'a> {
     pub(super) shots: &'a [Shot],
-    /// As the depth has it, with its information. [state][part]
+    /// As the depth has it, with its information. `[state][part]`
     pub(super) depth: Vec<Vec<Pose>>,
     pub(super) information: Vec<Vec<Matrix6<f64>>>,
     pub(super) slots: Vec<Option<Slot>>,

@@ -22,7 +22,7 @@ const CELLS: usize = 32;
 /// Claims of known parts on the surface of every state.
 #[derive(Clone, Debug, Default)]
 pub struct Claims {
-    /// Two bits a cell; nothing where nothing is claimed. [state][cell / 32]
+    /// Two bits a cell; nothing where nothing is claimed. `[state][cell / 32]`
     states: Vec<Vec<u64>>,
 }
 
@@ -32,7 +32,7 @@ impl Claims {
         Self::default()
     }
 
-    /// Claims of parts with these poses (world from canonical) [part][state]: on cells around
+    /// Claims of parts with these poses (world from canonical) `[part][state]`: on cells around
     /// surface that one of them explains (never contradicted, and confirmed by half of the states),
     /// and on those that one could explain (never contradicted).
     pub fn of_parts(evidence: &Evidence, parts: &[Vec<Pose>]) -> Self {

@@ -59,7 +59,7 @@ const MEASURED_STATES: usize = 4;
 
 impl Consensus {
     /// `open`: samples that every known part contradicts; `verdicts`: of the known parts
-    /// [part][sample].
+    /// `[part][sample]`.
     pub fn new(evidence: &Evidence, open: &[usize], verdicts: &[Vec<Verdict>], seed: u64) -> Self {
         let mut chosen = open.to_vec();
         fastrand::Rng::with_seed(seed).shuffle(&mut chosen);

@@ -7,7 +7,7 @@
 //! joints/joints.json                              Joints: the tree with a person's corrections
 //! twin/twin.json and what it names                TwinFile; written by the crate `hingecast-twin`
 //! ```
-//! A stage hands its artifact on as its file says it ([`as_written`]), so that a run that was
+//! A stage hands its artifact on as its file says it (`as_written`), so that a run that was
 //! resumed has the same bytes as one that was not. [`Made`] keeps artifacts in memory; files are
 //! read back for stages that were kept.
 

@@ -24,7 +24,7 @@ pub struct Parts {
     /// Of each joint, in the tree's order.
     pub certainty: Vec<Certainty>,
     /// How sharply the depth holds every part in every state; empty where pictures have nothing to
-    /// add to it. [state][part]
+    /// add to it. `[state][part]`
     pub information: Vec<Vec<Information>>,
     /// As sentences, gravest first.
     pub doubts: Vec<String>,

@@ -15,7 +15,7 @@ use std::path::{Path, PathBuf};
 pub struct Groups {
     /// Part of each gaussian.
     pub labels: Vec<u8>,
-    /// World at state s from world at state 0. [part][state]
+    /// World at state s from world at state 0. `[part][state]`
     pub motions: Vec<Vec<Pose>>,
     /// Part count tried, mean silhouette.
     pub silhouettes: Vec<(usize, f64)>,

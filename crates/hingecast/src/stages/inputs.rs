@@ -49,7 +49,7 @@ impl Inputs<'_> {
         Ok(view)
     }
 
-    /// Training frames of every state. [state]
+    /// Training frames of every state. `[state]`
     pub fn training_frames(&self) -> Vec<Vec<usize>> {
         (0..self.recording.n_states).map(|s| self.recording.frames_of(s, Split::Train)).collect()
     }

@@ -80,12 +80,12 @@ impl<'a> Observations<'a> {
         self.kept.push(if fits { Kept::Whole(packed) } else { Kept::Labels(packed.labels) });
     }
 
-    /// Takes all labels out, to be changed and put back by [`set_labels`](Self::set_labels). [view]
+    /// Takes all labels out, to be changed and put back by [`set_labels`](Self::set_labels). `[view]`
     pub fn take_labels(&mut self) -> Vec<Vec<u8>> {
         self.kept.iter_mut().map(|k| std::mem::take(k.labels())).collect()
     }
 
-    /// Puts labels back. [view]
+    /// Puts labels back. `[view]`
     pub fn set_labels(&mut self, labels: Vec<Vec<u8>>) {
         self.kept.iter_mut().zip(labels).for_each(|(k, new)| *k.labels() = new);
     }

@@ -44,7 +44,7 @@ pub struct Recorded {
 /// Records `n` successful episodes of `task` on this object or twin.
 ///
 /// # Errors
-/// Those of [`record`]; the object cannot be loaded.
+/// Those of `record`; the object cannot be loaded.
 pub fn record_on(
     object: &Path,
     task: &TaskSpec,
