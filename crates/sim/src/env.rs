@@ -6,6 +6,7 @@
 //! towards closed (a`[6]` > 0) or open; then `control::torques` every 2 ms. Same scene, seed and
 //! actions: same states, to the bit.
 
+mod arm_state;
 mod moment;
 
 pub use moment::Moment;
@@ -16,6 +17,7 @@ use crate::object::{self, body_pose, matrix, pose_of, write_pose, wxyz};
 use crate::path::SpotPath;
 use crate::scene::Scene;
 use crate::task::{CLOSE_FROM, TABLE, TaskKind};
+use arm_state::arm_state;
 use glam::{DMat3, DQuat, DVec3};
 use hingecast_geom::pose::quat_from_rotation_vector;
 use hingecast_geom::random::normal;
@@ -378,26 +380,6 @@ impl Env {
     /// For renderers.
     pub fn data_mut(&mut self) -> &mut MjData<Arc<MjModel>> {
         &mut self.data
-    }
-}
-
-fn arm_state(data: &MjData<Arc<MjModel>>, scene: &Scene) -> ArmState {
-    let ids = &scene.ids;
-    let nv = data.qvel().len();
-    let (jp, jr) = data.jac_site(true, true, ids.grip);
-    let mut full = vec![0.0; nv * nv];
-    data.full_m(&mut full).expect("the buffer has nv * nv numbers");
-    ArmState {
-        q: ids.arm_qpos.map(|a| data.qpos()[a]),
-        qdot: ids.arm_dof.map(|d| data.qvel()[d]),
-        mass: ids.arm_dof.map(|r| ids.arm_dof.map(|c| full[r * nv + c])),
-        bias: ids.arm_dof.map(|d| data.qfrc_bias()[d]),
-        jacobian: std::array::from_fn(|r| {
-            let rows = if r < 3 { &jp[r * nv..] } else { &jr[(r - 3) * nv..] };
-            ids.arm_dof.map(|d| rows[d])
-        }),
-        position: DVec3::from(data.site_xpos()[ids.grip]),
-        rotation: matrix(&data.site_xmat()[ids.grip]),
     }
 }
 
