@@ -11,6 +11,7 @@
 //! Mutations are seeded and know no coverage: the same seed tries the same files.
 
 mod mutate;
+mod samples;
 mod targets;
 
 use std::collections::BTreeSet;
