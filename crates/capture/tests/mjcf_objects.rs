@@ -118,3 +118,56 @@ fn our_own_samples_load() {
         assert!(!object.tree.joints.is_empty(), "{}", object.name);
     }
 }
+
+/// Inside itself, a class once was its own parent, and the loader looked for that parent for ever.
+#[test]
+fn a_default_class_inside_itself_is_refused() {
+    let geom = r#"<worldbody><geom type="sphere" size="1"/></worldbody>"#;
+    for defaults in [
+        r#"<default><default class="a"><default class="a"/></default></default>"#,
+        r#"<default><default class="main"/></default>"#,
+        "<default><default/></default>",
+    ] {
+        let e = load(&format!("<mujoco>{defaults}{geom}</mujoco>")).unwrap_err();
+        assert!(e.what.contains("there already") && e.place.contains("object.xml:1"), "{e}");
+    }
+    // Two top-level elements of one name are usual.
+    load(&format!("<mujoco><default/><default/>{geom}</mujoco>")).unwrap();
+}
+
+#[test]
+fn trees_that_are_too_deep_or_too_large_are_refused() {
+    let nested = |n: usize| {
+        let inner = r#"<geom type="sphere" size="0.1"/>"#;
+        format!("<mujoco><worldbody>{}{inner}{}</worldbody></mujoco>", "<body>".repeat(n), "</body>".repeat(n))
+    };
+    load(&nested(200)).unwrap();
+    let e = load(&nested(300)).unwrap_err();
+    assert!(e.what.contains("levels deep"), "{e}");
+    let body = r#"<body name="b"><joint axis="0 0 1"/><geom type="sphere" size="0.1"/></body>"#;
+    let e = load(&format!("<mujoco><worldbody>{}</worldbody></mujoco>", body.repeat(2000))).unwrap_err();
+    assert!(e.what.contains("at most 254"), "{e}");
+}
+
+/// Two joints that end in one link made the walk endless or exponential.
+#[test]
+fn a_urdf_link_is_the_child_of_one_joint() {
+    let link = |name: &str| {
+        let visual = r#"<visual><geometry><sphere radius="0.1"/></geometry></visual>"#;
+        format!(r#"<link name="{name}">{visual}</link>"#)
+    };
+    let joint = |name: &str, parent: &str, child: &str| {
+        let ends = format!(r#"<parent link="{parent}"/><child link="{child}"/>"#);
+        format!(r#"<joint name="{name}" type="fixed">{ends}</joint>"#)
+    };
+    let links = ["root", "a", "b"].map(link).concat();
+    let joints = |all: &[(&str, &str)]| -> String {
+        all.iter().enumerate().map(|(i, (p, c))| joint(&format!("j{i}"), p, c)).collect()
+    };
+    let robot = |all: &[(&str, &str)]| load(&format!("<robot name=\"r\">{links}{}</robot>", joints(all)));
+    robot(&[("root", "a"), ("a", "b")]).unwrap();
+    for wrong in [&[("root", "a"), ("a", "b"), ("b", "a")][..], &[("root", "a"), ("root", "b"), ("a", "b")]] {
+        let e = robot(wrong).unwrap_err();
+        assert!(e.what.contains("child of two joints"), "{e}");
+    }
+}

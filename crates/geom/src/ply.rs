@@ -200,6 +200,9 @@ pub fn read_vertices(path: &Path) -> Result<VertexTable, PlyError> {
     };
     let mut table = VertexTable::default();
     for element in &elements {
+        if element.properties.is_empty() && element.count > 0 {
+            return Err(bad(path, format!("its {} '{}' have no properties", element.count, element.name)));
+        }
         let is_vertex = element.name == "vertex";
         if is_vertex {
             table.names = element

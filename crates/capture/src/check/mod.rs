@@ -15,6 +15,7 @@ use crate::recording::transforms;
 use crate::{CaptureError, Recording, Split};
 use hingecast_geom::Progress;
 use serde::Serialize;
+use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 
 /// Whether `build` can go on.
@@ -127,7 +128,10 @@ pub fn check(path: &Path, progress: &Progress) -> Result<CheckReport, CaptureErr
     let looks = pixels::check(&documents, &recording, progress, &mut findings)?;
     space::check(&documents, &recording, &looks, &mut findings);
     findings.sort_by_key(|f| f.severity);
-    let states = (0..recording.frames.iter().map(|f| f.state + 1).max().unwrap_or(0))
+    // Those that are there: a number may be mistyped by many zeros.
+    let there: BTreeSet<usize> = recording.frames.iter().map(|f| f.state).collect();
+    let states = there
+        .into_iter()
         .map(|state| {
             let count = |wanted: &dyn Fn(&crate::Frame) -> bool| {
                 recording.frames.iter().filter(|f| f.state == state && wanted(f)).count()

@@ -56,7 +56,7 @@ pub(super) fn load(file: &Path, xml: &Document) -> Result<ArticulatedObject, Cap
         seen: BTreeSet::new(),
     };
     for d in children(root, "default") {
-        loader.collect_classes(d, None);
+        loader.collect_classes(d, None)?;
     }
     loader.read_materials()?;
     for world in children(root, "worldbody") {
@@ -69,12 +69,16 @@ pub(super) fn load(file: &Path, xml: &Document) -> Result<ArticulatedObject, Cap
 }
 
 impl<'a, 'i> Loader<'a, 'i> {
-    fn collect_classes(&mut self, node: Node<'a, 'i>, parent: Option<String>) {
+    fn collect_classes(&mut self, node: Node<'a, 'i>, parent: Option<String>) -> Result<(), CaptureError> {
         let name = node.attribute("class").unwrap_or("main").to_string();
-        self.classes.insert(name.clone(), (parent, node));
-        for child in children(node, "default") {
-            self.collect_classes(child, Some(name.clone()));
+        // A class inside itself would be asked for its parent for ever. Several top-level elements
+        // of one name are usual.
+        if parent.is_some() && self.classes.contains_key(&name) {
+            let what = format!("the default class '{name}' is there already");
+            return Err(self.reader.at(node, what, "give every nested <default> a class of its own"));
         }
+        self.classes.insert(name.clone(), (parent, node));
+        children(node, "default").try_for_each(|child| self.collect_classes(child, Some(name.clone())))
     }
 
     /// The attribute of an element, or of its default class, or of that class's parents.

@@ -18,6 +18,11 @@ use hingecast_geom::{KinematicTree, Pose, TriMesh};
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
+/// Deepest nesting of elements that is read; robots and furniture stay below 50.
+const MOST_LEVELS: usize = 256;
+/// Most parts of an object.
+const MOST_PARTS: usize = 254;
+
 /// An object with joints. `tree.parts[i]` names `parts[i]`; the joints' `values` are empty.
 #[derive(Clone, Debug, Default)]
 pub struct ArticulatedObject {
@@ -76,6 +81,12 @@ impl ArticulatedObject {
             let hint = "open it in an XML editor at that line, or export it again";
             CaptureError::new(format!("the object file is not XML: {e}"), file.display().to_string(), hint)
         })?;
+        // The loaders walk bodies and classes by recursion.
+        let levels = xml::levels(&xml);
+        if levels > MOST_LEVELS {
+            let what = format!("elements are nested {levels} levels deep, at most {MOST_LEVELS} are read");
+            return Err(CaptureError::new(what, file.display().to_string(), "flatten the tree of bodies"));
+        }
         match xml.root_element().tag_name().name() {
             "robot" => urdf::load(&file, &xml),
             "mujoco" => mjcf::load(&file, &xml),
@@ -122,6 +133,11 @@ impl ArticulatedObject {
         names: &BTreeMap<String, String>,
         seen: impl Fn(&str) -> bool,
     ) -> Result<Self, String> {
+        // Labels are 8-bit and 0 is the background. Asked first: naming takes its time.
+        if self.parts.len() > MOST_PARTS {
+            let n = self.parts.len();
+            return Err(format!("the object has {n} moving parts, at most {MOST_PARTS} are supported"));
+        }
         for part in &mut self.parts {
             part.drop_duplicate_faces();
             part.drop_unused_vertices();
@@ -138,10 +154,6 @@ impl ArticulatedObject {
         }
         (self.materials, self.textures) = (library.materials, library.textures);
         self.tree.validate()?;
-        // Labels are 8-bit and 0 is the background.
-        if self.parts.len() > 254 {
-            return Err(format!("the object has {} moving parts, at most 254 are supported", self.parts.len()));
-        }
         if self.parts.iter().all(|p| p.faces.is_empty()) {
             return Err("the object has no visible surface".into());
         }

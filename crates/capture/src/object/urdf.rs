@@ -39,6 +39,13 @@ pub(super) fn load(file: &Path, xml: &Document) -> Result<ArticulatedObject, Cap
             }
         }
     }
+    // The walk below goes to a link once for every joint that ends in it: two such joints make it
+    // endless (a cycle) or exponential (diamonds).
+    let mut ends: BTreeSet<&str> = BTreeSet::new();
+    if let Some(j) = joints.iter().find(|j| !ends.insert(&j.child)) {
+        let what = format!("the link {} is the child of two joints; {} is the second", j.child, j.name);
+        return Err(reader.error(what, "let every link be the child of one joint"));
+    }
     let names = partnet_names(folder, &links);
     let minor = minor_joints(folder, &joints, &names);
 

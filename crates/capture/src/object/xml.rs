@@ -1,7 +1,7 @@
 //! Reading numbers and names out of URDF and MJCF, with errors that name file, line and element.
 
 use crate::CaptureError;
-use roxmltree::Node;
+use roxmltree::{Document, Node};
 use std::path::Path;
 
 pub(super) struct Reader<'a> {
@@ -46,4 +46,25 @@ impl Reader<'_> {
 
 pub(super) fn children<'a, 'i: 'a>(node: Node<'a, 'i>, name: &'static str) -> impl Iterator<Item = Node<'a, 'i>> {
     node.children().filter(move |n| n.is_element() && n.tag_name().name() == name)
+}
+
+/// How deep elements are nested, without recursion: a file may nest them deeper than a stack goes.
+pub(super) fn levels(xml: &Document) -> usize {
+    let (mut deepest, mut level) = (0, 0usize);
+    let mut at = Some(xml.root());
+    while let Some(node) = at {
+        deepest = deepest.max(level);
+        at = if let Some(child) = node.first_child() {
+            level += 1;
+            Some(child)
+        } else {
+            let mut up = node;
+            while up.next_sibling().is_none() && up.parent().is_some() {
+                up = up.parent().expect("it was just there");
+                level -= 1;
+            }
+            up.next_sibling()
+        };
+    }
+    deepest
 }

@@ -57,7 +57,7 @@ pub fn read_depth(path: &Path) -> Result<(Vec<f32>, usize, usize), CaptureError>
 fn read_depth_npy(path: &Path) -> Result<(Vec<f32>, usize, usize), CaptureError> {
     let (values, shape) = read_npy(path)?;
     let (h, w) = match shape[..] {
-        [h, w] | [h, w, 1] | [1, h, w] => (h, w),
+        [h, w] | [h, w, 1] | [1, h, w] if h > 0 && w > 0 => (h, w),
         _ => {
             let hint = "save depth as an array of shape (height, width)";
             let what = format!("a depth array has the shape {shape:?}");
@@ -65,6 +65,15 @@ fn read_depth_npy(path: &Path) -> Result<(Vec<f32>, usize, usize), CaptureError>
         }
     };
     Ok((values.into_iter().map(|x| x as f32).collect(), w, h))
+}
+
+/// Bytes that the header of a .npy file of version 2 or 3 says it has: a 32-bit number that the library
+/// would make room for unasked. `None` for other files.
+fn header_len(bytes: &[u8]) -> Option<u64> {
+    let versions = [2, 3];
+    let long = bytes.starts_with(b"\x93NUMPY") && bytes.get(6).is_some_and(|v| versions.contains(v));
+    let length: [u8; 4] = bytes.get(8..12).filter(|_| long)?.try_into().ok()?;
+    Some(u64::from(u32::from_le_bytes(length)))
 }
 
 /// Any real-valued .npy array as row-major f64 with its shape.
@@ -77,6 +86,9 @@ pub fn read_npy(path: &Path) -> Result<(Vec<f64>, Vec<usize>), CaptureError> {
         let hint = "save it with numpy.save as a plain array of numbers";
         CaptureError::new(format!("not a readable .npy array: {e}"), path.display().to_string(), hint)
     };
+    if header_len(&bytes).is_some_and(|n| n > bytes.len() as u64) {
+        return Err(bad(&"it is cut short, within its header"));
+    }
     let file = || npyz::NpyFile::new(&bytes[..]).map_err(|e| bad(&e));
     let header = file()?;
     let shape: Vec<usize> = header.shape().iter().map(|&n| n as usize).collect();
@@ -87,7 +99,12 @@ pub fn read_npy(path: &Path) -> Result<(Vec<f64>, Vec<usize>), CaptureError> {
         ($($t:ty),*) => {$(
             if let Ok(data) = file()?.data::<$t>() {
                 let values: Result<Vec<f64>, _> = data.map(|x| x.map(|x| x as f64)).collect();
-                return Ok((values.map_err(|e| bad(&e))?, shape));
+                let values = values.map_err(|e| bad(&e))?;
+                let wanted = shape.iter().try_fold(1usize, |n, k| n.checked_mul(*k));
+                if wanted != Some(values.len()) {
+                    return Err(bad(&format!("its shape is {shape:?} and it holds {} numbers", values.len())));
+                }
+                return Ok((values, shape));
             }
         )*};
     }
@@ -145,4 +162,45 @@ fn png(bytes: &[u8], w: usize, h: usize, color: ExtendedColorType) -> image::Ima
 /// When the file cannot be written.
 pub fn write_file(path: &Path, bytes: &[u8]) -> Result<(), CaptureError> {
     write_whole(path, bytes).map_err(|e| CaptureError::write(path, e))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A .npy file of version 1 or 2 with a shape and so many f32.
+    fn npy(version: u8, shape: &str, header_len: Option<u32>, numbers: usize) -> Vec<u8> {
+        let text = format!("{{'descr': '<f4', 'fortran_order': False, 'shape': ({shape}), }}\n");
+        let length = header_len.unwrap_or(text.len() as u32);
+        let mut out = b"\x93NUMPY".to_vec();
+        out.extend([version, 0]);
+        if version == 1 {
+            out.extend((length as u16).to_le_bytes())
+        } else {
+            out.extend(length.to_le_bytes())
+        }
+        out.extend(text.bytes());
+        out.extend(std::iter::repeat_n(1f32.to_le_bytes(), numbers).flatten());
+        out
+    }
+
+    #[test]
+    fn arrays_without_pixels_and_short_headers_are_refused() {
+        let dir = tempfile::tempdir().unwrap();
+        let file = dir.path().join("depth.npy");
+        let read = |bytes: &[u8]| {
+            std::fs::write(&file, bytes).unwrap();
+            read_depth(&file)
+        };
+        for version in [1, 2] {
+            assert_eq!(read(&npy(version, "2, 3", None, 6)).unwrap(), (vec![1.0; 6], 3, 2));
+        }
+        for shape in ["0, 0", "0, 24", "24, 0"] {
+            let e = read(&npy(1, shape, None, 0)).unwrap_err();
+            assert!(e.what.contains(&format!("[{shape}]")) && e.place.ends_with("depth.npy"), "{e}");
+        }
+        let e = read(&npy(2, "2, 3", Some(4000), 6)).unwrap_err();
+        assert!(e.what.contains("within its header"), "{e}");
+        assert!(read(&npy(1, "2, 3", None, 5)).is_err(), "a number is missing");
+    }
 }
