@@ -171,3 +171,39 @@ fn a_urdf_link_is_the_child_of_one_joint() {
         assert!(e.what.contains("child of two joints"), "{e}");
     }
 }
+
+/// Skipped in silence, each of these made another object of it.
+#[test]
+fn what_this_reader_does_not_understand_is_refused_with_its_line() {
+    let base = |inner: &str| format!("<mujoco>\n{inner}\n<worldbody><geom size=\"0.1\"/></worldbody></mujoco>");
+    let body = |inner: &str| format!("<mujoco>\n<worldbody><geom size=\"0.1\"/>{inner}</worldbody></mujoco>");
+    let cases = [
+        (body(r#"<frame pos="0 0 1"/>"#), "<frame>"),
+        (body(r#"<include file="door.xml"/>"#), "<include>"),
+        (body(r#"<replicate count="2"/>"#), "<replicate>"),
+        (body(r#"<body><attach model="m"/></body>"#), "<attach>"),
+        (body(r#"<body><joint ref="0.1"/></body>"#), "ref="),
+        (body(r#"<body><joint limited="false"/></body>"#), "limited="),
+        (body(r#"<geom type="capsule" mesh="m"/>"#), "fitted"),
+        (base(r#"<compiler eulerseq="zyx"/>"#), "eulerseq="),
+        (base(r#"<equality><joint joint1="a"/></equality>"#), "<equality>"),
+        (base(r#"<asset><mesh name="m" vertex="0 0 0"/></asset>"#), "vertex="),
+        (base(r#"<asset><mesh name="m" file="m.obj" refpos="0 0 1"/></asset>"#), "refpos="),
+        (base("<deformable/>"), "<deformable>"),
+    ];
+    for (text, says) in cases {
+        let e = load(&text).unwrap_err();
+        assert!(e.what.contains(says) && e.place.contains("object.xml:2"), "{says}: {e}");
+    }
+}
+
+#[test]
+fn settings_add_up_and_ghosts_are_not_seen() {
+    let settings = r#"<compiler angle="degree"/><compiler angle="radian"/>"#;
+    let ghosts = r#"<geom size="9" rgba="1 0 0 0"/><geom size="9" material="air"/>"#;
+    let asset = r#"<asset><material name="air" rgba="1 1 1 0"/></asset>"#;
+    let body = r#"<body><joint range="-1.6 0"/><geom size="0.1"/></body>"#;
+    let object = load(&format!("<mujoco>{settings}{asset}<worldbody>{ghosts}{body}</worldbody></mujoco>")).unwrap();
+    assert_eq!(object.tree.joints[0].limits, [-1.6, 0.0]);
+    assert!(object.diagonal() < 1.0, "{}", object.diagonal());
+}

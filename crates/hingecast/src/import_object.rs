@@ -67,8 +67,8 @@ pub struct Imported {
 pub fn import(source: &Path, out: &Path, config: &ImportConfig, progress: &Progress) -> Result<Imported> {
     may_become("output folder", out, &["twin.json"], "give a new folder")?;
     may_be_emptied("output folder", out, &hingecast_twin::is_ours, "give a new folder, or empty this one yourself")?;
-    let mut object = ArticulatedObject::load(source)?;
-    let mut changes = Vec::new();
+    let mut object = crate::objects::load(source)?;
+    let mut changes = std::mem::take(&mut object.notes);
     // The ranges that `synth` plays: files let doors swing through their cabinets.
     let useful = useful_ranges(&object);
     for (joint, range) in object.tree.joints.iter_mut().zip(&useful) {
