@@ -86,6 +86,10 @@ pub fn import(source: &Path, out: &Path, config: &ImportConfig, progress: &Progr
     if config.scale != 1.0 {
         changes.push(format!("all lengths times {}", config.scale));
     }
+    for c in object.tree.couplings.iter().filter(|c| c.line().is_none()) {
+        let [a, b] = [c.follower, c.leader].map(|j| object.tree.joints[j].name.as_str());
+        changes.push(format!("joint '{a}' follows '{b}' along a curve: robot.xml says so, robot.urdf cannot"));
+    }
     let merged: Vec<String> = object
         .tree
         .parts
@@ -162,6 +166,12 @@ pub fn import(source: &Path, out: &Path, config: &ImportConfig, progress: &Progr
 fn rescale(object: &mut ArticulatedObject, scale: f64) {
     for part in &mut object.parts {
         part.vertices.iter_mut().for_each(|v| *v *= scale as f32);
+    }
+    let length = |j: usize| if object.tree.joints[j].screw.kind.turns() { 1.0 } else { scale };
+    let units: Vec<f64> = (0..object.tree.joints.len()).map(length).collect();
+    for c in &mut object.tree.couplings {
+        let (follower, leader) = (units[c.follower], units[c.leader]);
+        c.polynomial = std::array::from_fn(|k| c.polynomial[k] * follower / leader.powi(k as i32));
     }
     for joint in &mut object.tree.joints {
         joint.screw.pivot *= scale;

@@ -5,7 +5,7 @@
 //! Seen is what MuJoCo's viewer shows: geoms of groups 0 to 2 that are not transparent. What is
 //! left out is said in the object's notes; what a tree of hinges and slides cannot say is refused.
 
-mod couplings;
+pub(crate) mod couplings;
 mod geometry;
 
 use crate::object::{body_pose, name_or};

@@ -10,6 +10,25 @@ use std::collections::BTreeMap;
 /// Coefficients of one in MuJoCo's `polycoef`.
 const TERMS: usize = 5;
 
+/// Joints of a model that follow others: follower and leader (MuJoCo's ids), polynomial as in
+/// [`Coupling`].
+pub(crate) fn followers(model: &MjModel) -> Vec<(usize, usize, [f64; TERMS])> {
+    let active = (0..model.ffi().neq as usize).filter(|&e| model.eq_active0()[e]);
+    active.filter(|&e| model.eq_type()[e] == MjtEq::mjEQ_JOINT).filter_map(|e| follower(model, e)).collect()
+}
+
+fn follower(model: &MjModel, e: usize) -> Option<(usize, usize, [f64; TERMS])> {
+    let [follower, leader] = [model.eq_obj1id()[e], model.eq_obj2id()[e]].map(usize::try_from);
+    let (follower, leader) = (follower.ok()?, leader.ok()?);
+    let polynomial = std::array::from_fn(|k| model.eq_data()[e][k]);
+    Some((follower, leader, absolute(polynomial, at_rest(model, follower), at_rest(model, leader))))
+}
+
+/// The joint's value in the reference configuration.
+fn at_rest(model: &MjModel, joint: usize) -> f64 {
+    model.qpos0()[model.jnt_qposadr()[joint] as usize]
+}
+
 impl Reader<'_> {
     /// `ids`: MuJoCo's joint -> the tree's. `part_of`: of every body.
     pub(super) fn couplings(
@@ -24,22 +43,15 @@ impl Reader<'_> {
             let name = model.id_to_name(MjtObjBase::mjOBJ_EQUALITY, e).unwrap_or_default();
             match model.eq_type()[e] {
                 MjtEq::mjEQ_JOINT => {
-                    let [Some(follower), leader] = ends else { continue };
-                    let Some(&joint) = ids.get(&follower) else { continue };
-                    let at_rest = |j: usize| model.qpos0()[model.jnt_qposadr()[j] as usize];
-                    let polynomial: [f64; TERMS] = std::array::from_fn(|k| model.eq_data()[e][k]);
-                    match leader.map(|j| ids.get(&j).map(|&id| (j, id))) {
-                        Some(Some((j, leader))) => {
-                            let polynomial = absolute(polynomial, at_rest(follower), at_rest(j));
-                            object.tree.couplings.push(Coupling { follower: joint, leader, polynomial });
-                        }
-                        Some(None) => {}
-                        None => {
-                            let held = at_rest(follower) + polynomial[0];
-                            object.tree.joints[joint].limits = [held; 2];
-                            let name = &object.tree.joints[joint].name;
-                            object.notes.push(format!("joint '{name}' is held at {held:.4} by an equality"));
-                        }
+                    let Some(joint) = ends[0].and_then(|j| ids.get(&j)) else { continue };
+                    if let Some((_, leader, polynomial)) = follower(model, e) {
+                        let coupled = ids.get(&leader).map(|&leader| Coupling { follower: *joint, leader, polynomial });
+                        object.tree.couplings.extend(coupled);
+                    } else {
+                        let held = at_rest(model, ends[0].unwrap_or(0)) + model.eq_data()[e][0];
+                        object.tree.joints[*joint].limits = [held; 2];
+                        let name = &object.tree.joints[*joint].name;
+                        object.notes.push(format!("joint '{name}' is held at {held:.4} by an equality"));
                     }
                 }
                 MjtEq::mjEQ_CONNECT | MjtEq::mjEQ_WELD => {
