@@ -55,8 +55,13 @@ impl Reader<'_> {
                     }
                 }
                 MjtEq::mjEQ_CONNECT | MjtEq::mjEQ_WELD => {
-                    let parts = self.bodies_of(e, ends).map(|b| part_of[b]);
-                    if parts[0] != parts[1] {
+                    let bodies = self.bodies_of(e, ends);
+                    let parts = bodies.map(|b| part_of[b]);
+                    if bodies.iter().any(|&b| model.body_mocapid()[b] >= 0) {
+                        object
+                            .notes
+                            .push(format!("the equality '{name}' to a mocap body is left out: a handle to drag by"));
+                    } else if parts[0] != parts[1] {
                         let what = format!("the equality '{name}' closes a loop of joints");
                         return Err(self.refuse(what, "a twin is a tree of joints: take the equality out"));
                     }
