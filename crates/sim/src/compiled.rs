@@ -21,7 +21,7 @@ use std::path::Path;
 ///
 /// # Errors
 /// When MuJoCo refuses the file; when it holds what a tree of hinges and slides cannot say (ball
-/// joints, several joints of one body, loops, cloth, height fields); when nothing of it is seen.
+/// joints, loops, cloth, height fields); when nothing of it is seen.
 pub fn load(file: &Path) -> Result<ArticulatedObject, SimError> {
     let (model, said) = log::collect(|| {
         let mut spec = MjSpec::from_xml(file).map_err(|e| SimError::load(file, e))?;
@@ -81,27 +81,28 @@ impl Reader<'_> {
             let own: Vec<usize> = joints.iter().copied().filter(|&j| model.jnt_bodyid()[j] as usize == body).collect();
             let parent = part_of[model.body_parentid()[body] as usize];
             let name = self.name(MjtObjBase::mjOBJ_BODY, body);
-            part_of[body] = match self.only_joint(&own, &mut object.notes)? {
-                None => {
-                    object.parts[parent].links.push(name);
-                    parent
-                }
-                Some(id) => {
-                    object.parts.push(PartGeometry { links: vec![name], ..Default::default() });
-                    let child = object.parts.len() - 1;
-                    let pose = body_pose(&data, body);
-                    let screw = Screw {
-                        kind: self.kind(id),
-                        axis: pose.rotate(DVec3::from(model.jnt_axis()[id])).normalize(),
-                        pivot: pose.apply(DVec3::from(model.jnt_pos()[id])),
-                    };
-                    ids.insert(id, object.tree.joints.len());
-                    let limits = self.limits(id)?;
-                    let name = self.joint_name(id, body);
-                    object.tree.joints.push(Joint { name, parent, child, screw, values: Vec::new(), limits });
-                    child
-                }
-            };
+            let own = self.moving(&own, &mut object.notes)?;
+            let mut part = parent;
+            for (k, &id) in own.iter().enumerate() {
+                // Several joints of a body act one after the other: between them hang parts of
+                // nothing.
+                let link = if k + 1 < own.len() { format!("{name}_{}", k + 1) } else { name.clone() };
+                object.parts.push(PartGeometry { links: vec![link], ..Default::default() });
+                let pose = body_pose(&data, body);
+                let screw = Screw {
+                    kind: self.kind(id),
+                    axis: pose.rotate(DVec3::from(model.jnt_axis()[id])).normalize(),
+                    pivot: pose.apply(DVec3::from(model.jnt_pos()[id])),
+                };
+                ids.insert(id, object.tree.joints.len());
+                let (name, limits, child) = (self.joint_name(id, body), self.limits(id)?, object.parts.len() - 1);
+                object.tree.joints.push(Joint { name, parent: part, child, screw, values: Vec::new(), limits });
+                part = child;
+            }
+            if own.is_empty() {
+                object.parts[parent].links.push(name);
+            }
+            part_of[body] = part;
         }
         let seen = self.geometry(&data, &part_of, &mut object)?;
         self.couplings(&ids, &part_of, &mut object)?;
@@ -112,25 +113,16 @@ impl Reader<'_> {
         Ok(object)
     }
 
-    /// The hinge or slide of a body; free joints stay where they are.
-    fn only_joint(&self, own: &[usize], notes: &mut Vec<String>) -> Result<Option<usize>, SimError> {
+    /// The hinges and slides of a body; free joints stay where they are.
+    fn moving(&self, own: &[usize], notes: &mut Vec<String>) -> Result<Vec<usize>, SimError> {
         let type_of = |j: usize| self.model.jnt_type()[j];
         let named = |j: usize| self.name(MjtObjBase::mjOBJ_JOINT, j);
         if let Some(&ball) = own.iter().find(|&&j| type_of(j) == MjtJoint::mjJNT_BALL) {
             return Err(self.refuse(format!("'{}' is a ball joint", named(ball)), "use hinges and slides"));
         }
-        match own.iter().filter(|&&j| moves(self.model, j)).collect::<Vec<_>>()[..] {
-            [] => {
-                let free = |j: &usize| format!("'{}' is free: its body stays where it is modelled", named(*j));
-                notes.extend(own.iter().map(free));
-                Ok(None)
-            }
-            [&one] => Ok(Some(one)),
-            [_, second, ..] => {
-                let what = format!("'{}' is the second joint of its body", named(*second));
-                Err(self.refuse(what, "put each joint into a body of its own, with something to see in it"))
-            }
-        }
+        let free = own.iter().filter(|&&j| type_of(j) == MjtJoint::mjJNT_FREE);
+        notes.extend(free.map(|&j| format!("'{}' is free: its body stays where it is modelled", named(j))));
+        Ok(own.iter().copied().filter(|&j| moves(self.model, j)).collect())
     }
 
     fn joint_name(&self, id: usize, body: usize) -> String {

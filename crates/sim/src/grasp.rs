@@ -55,6 +55,8 @@ const APPROACH: [f64; 3] = [0.0, 0.04, 0.09];
 const ALONG: [f64; 3] = [0.2, 0.4, 0.6];
 /// Overlap that contact may have there, m: the part rocks between the pads.
 const ROCKING: f64 = 0.004;
+/// A part of which no point goes so far has not been opened by anybody, m.
+const LEAST_WAY: f64 = 0.005;
 /// Longest way of the grasp to 60 % of the range, m: beyond it the arm would have to reach around
 /// the object.
 const LONGEST_WAY: f64 = 0.25;
@@ -131,12 +133,19 @@ pub fn candidates(path: &Path, kind: TaskKind, joint: Option<&str>, size: Size) 
         ));
     }
     let mut out = Vec::new();
+    let mut still = None;
     for j in all.iter().filter(|j| joint.is_none_or(|n| n == j.name)) {
         let s = match size {
             Size::Exactly(s) => s,
             Size::Reachable(factor) => two_digits((factor * reachable_scale(&mut data_at(&data), hand, j)).min(1.0)),
         };
-        out.extend(at_scale(path, kind, &j.name, s)?);
+        match at_scale(path, kind, &j.name, s)? {
+            Reached::Places(places) => out.extend(places),
+            Reached::HardlyMoves(way) => still = still.or(Some((j, way))),
+        }
+    }
+    if let (true, Some((j, way))) = (out.is_empty(), still) {
+        return Err(hardly_moves(j, way, place));
     }
     out.sort_by(|a, b| b.score.total_cmp(&a.score));
     Ok(distinct(out))
@@ -154,6 +163,18 @@ fn two_digits(s: f64) -> f64 {
     (s / unit).floor() * unit
 }
 
+fn corners([lo, hi]: [DVec3; 2]) -> impl Iterator<Item = DVec3> {
+    (0..8).map(move |k: usize| {
+        let pick = |bit: usize, l: f64, h: f64| if k >> bit & 1 == 0 { l } else { h };
+        DVec3::new(pick(0, lo.x, hi.x), pick(1, lo.y, hi.y), pick(2, lo.z, hi.z))
+    })
+}
+
+/// How far the farthest corner of a box goes.
+fn farthest(part: [DVec3; 2], motion: &Pose) -> f64 {
+    corners(part).map(|c| motion.apply(c).distance(c)).fold(0.0, f64::max)
+}
+
 /// At most 1; so that the farthest point of the part neither travels nor stands beyond what the arm
 /// does with ease.
 fn reachable_scale(data: &mut Probe, hand: Hand, joint: &ObjectJoint) -> f64 {
@@ -163,27 +184,43 @@ fn reachable_scale(data: &mut Probe, hand: Hand, joint: &ObjectJoint) -> f64 {
     let part = bounds(data, |g| is_part(data.model(), g, joint)).unwrap_or([lo, hi]);
     let screw = object::screw(data, joint);
     let motion = screw.motion(0.6 * (open - closed));
-    let corner = |k: usize| {
-        let pick = |bit: usize, l: f64, h: f64| if k >> bit & 1 == 0 { l } else { h };
-        DVec3::new(pick(0, part[0].x, part[1].x), pick(1, part[0].y, part[1].y), pick(2, part[0].z, part[1].z))
-    };
     // The grasp is somewhere short of the farthest corner; 0.85 of it is usual.
-    let way = 0.85 * (0..8).map(|k| motion.apply(corner(k)).distance(corner(k))).fold(0.0, f64::max);
-    let top = (0..8).map(|k| motion.apply(corner(k)).z.max(corner(k).z) - lo.z).fold(0.0, f64::max);
+    let way = 0.85 * farthest(part, &motion);
+    let top = corners(part).map(|c| motion.apply(c).z.max(c.z) - lo.z).fold(0.0, f64::max);
     let limits = [LONGEST_WAY / way, HIGHEST / top, LARGEST / (hi - lo).length()];
     two_digits(limits.into_iter().filter(|s| s.is_finite() && *s > 0.0).fold(1.0, f64::min))
 }
 
-fn at_scale(path: &Path, kind: TaskKind, name: &str, scale: f64) -> Result<Vec<Candidate>, SimError> {
+/// What is found at one size of the object.
+enum Reached {
+    Places(Vec<Candidate>),
+    /// No point of the part goes farther than this, m.
+    HardlyMoves(f64),
+}
+
+fn hardly_moves(joint: &ObjectJoint, way: f64, place: String) -> SimError {
+    let [lo, hi] = joint.range;
+    let range = if joint.slides { format!("{lo} .. {hi}") } else { format!("{:.2} deg", (hi - lo).to_degrees()) };
+    let what = format!("joint '{}' hardly moves: {range}, {:.1} mm at most", joint.name, 1e3 * way);
+    let hint = "does the file count in radians? <compiler angle=\"radian\"/>; or take another --joint";
+    SimError::task(what, place, hint)
+}
+
+fn at_scale(path: &Path, kind: TaskKind, name: &str, scale: f64) -> Result<Reached, SimError> {
+    let none = || Ok(Reached::Places(Vec::new()));
     let mut data = alone(path, scale, Some(GRIPPER))?;
     park_gripper(&mut data);
-    let Some(joint) = object::joints(data.model()).into_iter().find(|j| j.name == name) else { return Ok(Vec::new()) };
+    let Some(joint) = object::joints(data.model()).into_iter().find(|j| j.name == name) else { return none() };
     let hand = Hand::of(data.model());
     let (closed, open) = ends(&mut data, hand, &joint);
     pose_joint(&mut data, &joint, closed);
-    let Some([low, _]) = object_bounds(&data, hand) else { return Ok(Vec::new()) };
-    let Some(part) = bounds(&data, |g| is_part(data.model(), g, &joint)) else { return Ok(Vec::new()) };
+    let Some([low, _]) = object_bounds(&data, hand) else { return none() };
+    let Some(part) = bounds(&data, |g| is_part(data.model(), g, &joint)) else { return none() };
     let screw = object::screw(&data, &joint);
+    let way = farthest(part, &screw.motion(open - closed));
+    if way < LEAST_WAY {
+        return Ok(Reached::HardlyMoves(way));
+    }
     let search = Search { hand, closed, open, screw, low: low.z, part, joint };
     let mut base = TaskSpec::new(kind, name, scale);
     base.part_centre = 0.5 * (part[0] + part[1]);
@@ -192,7 +229,7 @@ fn at_scale(path: &Path, kind: TaskKind, name: &str, scale: f64) -> Result<Vec<C
     for (approach, closing) in directions() {
         out.extend(search.scan(&mut data, approach, closing, &base));
     }
-    Ok(out)
+    Ok(Reached::Places(out))
 }
 
 /// Closed is the end at which the object is more compact; where both are alike, the one nearer to

@@ -44,6 +44,25 @@ pub(crate) fn read(path: &Path, visuals: bool) -> Result<MjSpec, SimError> {
     Ok(spec)
 }
 
+/// Whatever collides with anything in the object's file shall collide with the arm, too: files that
+/// let only `conaffinity` speak (contype 0) would let its fingers through. Such geoms get a bit that
+/// no contype of the object has; the answer is that bit, for the arm's contype, or 0 where none is
+/// needed.
+pub(crate) fn make_touchable(spec: &mut MjSpec) -> i32 {
+    let masks: Vec<[i32; 2]> = spec.geom_iter().map(|g| [g.contype(), g.conaffinity()]).collect();
+    // The arm's conaffinity is 1.
+    if masks.iter().all(|[con, aff]| (con | aff) == 0 || con & 1 != 0) {
+        return 0;
+    }
+    let taken = masks.iter().fold(0, |all, [con, _]| all | con);
+    let bit = (2..31).map(|k| 1 << k).find(|bit| taken & bit == 0).unwrap_or(2);
+    for geom in spec.geom_iter_mut().filter(|g| g.contype() | g.conaffinity() != 0) {
+        let aff = geom.conaffinity() | bit;
+        geom.set_conaffinity(aff);
+    }
+    bit
+}
+
 /// Whether the base can move by itself.
 pub(crate) fn stands_free(spec: &MjSpec) -> bool {
     spec.joint_iter().any(|j| j.type_() == MjtJoint::mjJNT_FREE)

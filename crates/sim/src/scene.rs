@@ -87,7 +87,9 @@ impl Scene {
             false => Some(spoil(&mut child, config, task)?),
         };
         let free = object::stands_free(&child);
-        let mut spec = MjSpec::from_xml_string(ARM_ON_TABLE).map_err(|e| SimError::load(Path::new("the arm"), e))?;
+        let arm =
+            ARM_ON_TABLE.replace("contype=\"2\"", &format!("contype=\"{}\"", 2 | object::make_touchable(&mut child)));
+        let mut spec = MjSpec::from_xml_string(&arm).map_err(|e| SimError::load(Path::new("the arm"), e))?;
         attach(&mut spec, &mut child, task.scale, !free, path)?;
         let model = spec.compile().map_err(|e| SimError::load(path, e))?;
         let xml = spec.save_xml_string(1 << 24).map_err(|e| SimError::load(path, e))?;
@@ -215,11 +217,18 @@ impl Ids {
     }
 }
 
+/// The text of a hand whose geoms have the usual contype and `bit`.
+fn touching(xml: &str, bit: i32) -> String {
+    let default = format!("<default><geom contype=\"{}\"/></default>\n  <worldbody>", 1 | bit);
+    if bit == 0 { xml.to_string() } else { xml.replacen("<worldbody>", &default, 1) }
+}
+
 /// The object alone, scaled, its base frame in the world's origin.
 pub(crate) fn alone(path: &Path, scale: f64, with: Option<&str>) -> Result<MjData<Arc<MjModel>>, SimError> {
     let mut child = object::read(path, false)?;
+    let bit = object::make_touchable(&mut child);
     let mut spec = match with {
-        Some(xml) => MjSpec::from_xml_string(xml).map_err(|e| SimError::load(path, e))?,
+        Some(xml) => MjSpec::from_xml_string(&touching(xml, bit)).map_err(|e| SimError::load(path, e))?,
         None => MjSpec::new(),
     };
     attach(&mut spec, &mut child, scale, false, path)?;

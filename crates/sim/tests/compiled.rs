@@ -186,16 +186,29 @@ fn joints_that_follow_others_are_kept_as_mujoco_means_them() {
     assert!(agreement(&object, &file) > 0.995);
 }
 
+/// Joints of one body act one after the other, the first outermost; between them is a part of
+/// nothing.
+#[test]
+fn a_body_may_have_several_joints() {
+    let joints = r#"<joint name="x" type="slide" axis="1 0 0" range="0 0.2"/>
+      <joint name="turn" pos="0.05 0 0" axis="0 1 1" range="0 80"/><joint name="up" type="slide" range="0 0.1"/>"#;
+    let dir = tempfile::tempdir().unwrap();
+    let file = write(dir.path(), &cupboard("", &format!(r#"<body name="cap" pos="0 -0.3 0">{joints}{LEAF}</body>"#)));
+    let object = load(&file).unwrap();
+    assert_eq!(object.tree.parts, ["case", "cap_1", "cap_2", "cap"]);
+    assert_eq!(object.tree.joints.iter().map(|j| (j.parent, j.child)).collect::<Vec<_>>(), [(0, 1), (1, 2), (2, 3)]);
+    assert!(object.parts[1].faces.is_empty() && object.parts[2].faces.is_empty());
+    assert!(agreement(&object, &file) > 0.995);
+}
+
 #[test]
 fn what_a_tree_of_hinges_cannot_say_is_refused_in_three_lines() {
     let dir = tempfile::tempdir().unwrap();
     let part = |joints: &str, geom: &str| format!(r#"<body name="door">{joints}{geom}</body>"#);
-    let two = r#"<joint name="x" type="slide" range="0 1"/><joint name="turn" range="0 9"/>"#;
     let loops = r#"<equality><connect name="rod" body1="door" body2="case" anchor="0 0 0"/></equality>"#;
     let sphere = r#"<geom size="0.1"/>"#;
     let hidden = r#"<geom size="0.1" group="3"/>"#;
     for (head, door, says) in [
-        ("", part(two, sphere), "'turn' is the second joint"),
         ("", part(r#"<joint name="b" type="ball"/>"#, sphere), "'b' is a ball joint"),
         (loops, part(HINGE, sphere), "'rod' closes a loop"),
         ("", part(HINGE, hidden), "no visible surface"),

@@ -86,7 +86,9 @@ fn listed(folder: &Path) -> Vec<String> {
 pub fn record(host: &Host, object: &str, config: &SynthConfig, out: &Path) -> Result<SynthReport> {
     let object = hingecast::objects::load(&ArticulatedObject::resolve(object)?)?;
     object.notes.iter().for_each(|note| host.watcher.say(&format!("note: {note}")));
-    Ok(synth(&object, config, out, &host.watcher.stage("record"))?)
+    let report = synth(&object, config, out, &host.watcher.stage("record"))?;
+    report.notes.iter().for_each(|note| host.watcher.say(&format!("note: {note}")));
+    Ok(report)
 }
 
 /// Records, unless the same object lies there recorded with the same settings.

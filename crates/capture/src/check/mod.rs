@@ -6,6 +6,7 @@
 
 mod description;
 mod fix;
+mod motion;
 mod pixels;
 mod space;
 

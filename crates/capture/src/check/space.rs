@@ -38,6 +38,7 @@ pub(super) fn check(documents: &[Document], recording: &Recording, looks: &[Opti
         return;
     }
     states_apart(recording, looks, &by_state, out);
+    out.extend(super::motion::nothing_moves(recording, looks, &by_state));
 }
 
 /// Cameras of a state that stand at one point give no depth.
@@ -109,7 +110,7 @@ fn some_views(recording: &Recording, looks: &[Option<Look>], state: usize) -> Ve
 }
 
 /// Object points of a frame in camera axes, at depth times `scale`.
-fn points(look: &Look, camera: &Camera, scale: f64) -> Vec<DVec3> {
+pub(super) fn points(look: &Look, camera: &Camera, scale: f64) -> Vec<DVec3> {
     let good: Vec<usize> = (0..look.depth.len()).filter(|&i| look.object[i] == 1 && look.depth[i] > 0.0).collect();
     let n = good.len().min(POINTS);
     (0..n)

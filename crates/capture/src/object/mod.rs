@@ -181,9 +181,13 @@ impl ArticulatedObject {
         if self.parts.iter().all(|p| p.faces.is_empty()) {
             return Err("the object has no visible surface".into());
         }
-        let bare = |j: &&hingecast_geom::Joint| self.parts[j.child].faces.is_empty();
-        if let Some(joint) = self.tree.joints.iter().find(bare) {
-            let part = &self.tree.parts[joint.child];
+        // A part may be nothing but a link between two joints.
+        let bare = |j: usize| {
+            let on_it = |p: usize| self.tree.ancestry(p).contains(&j);
+            (0..self.parts.len()).all(|p| self.parts[p].faces.is_empty() || !on_it(p))
+        };
+        if let Some(j) = (0..self.tree.joints.len()).find(|&j| bare(j)) {
+            let (joint, part) = (&self.tree.joints[j], &self.tree.parts[self.tree.joints[j].child]);
             return Err(format!("joint '{}' carries '{part}', which has no visible surface", joint.name));
         }
         Ok(self)

@@ -85,6 +85,8 @@ pub struct SynthReport {
     pub frames: usize,
     /// Joint name, first and last value of its play.
     pub ranges: Vec<(String, [f64; 2])>,
+    /// What a person should know: joints that hardly move, a sentence each.
+    pub notes: Vec<String>,
 }
 
 pub(super) fn validate(c: &SynthConfig) -> Result<(), CaptureError> {

@@ -18,6 +18,7 @@ mod render;
 pub(crate) mod scene;
 mod shade;
 mod staging;
+mod still;
 
 pub use config::{Noise, SynthConfig, SynthReport};
 pub use ranges::{UsefulRange, useful_ranges};
@@ -112,6 +113,7 @@ pub fn synth(
         recording: out,
         truth: config.truth.then_some(truth_out),
         frames: shots.len(),
+        notes: still::notes(object, &ranges, &shots),
         ranges: names.zip(ranges.iter().map(|r| [r.lower, r.upper])).collect(),
     })
 }

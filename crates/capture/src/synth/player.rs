@@ -36,7 +36,9 @@ pub(super) fn hold(object: &ArticulatedObject, states: &[Vec<f64>], metres_per_u
     let joints = object.tree.joints.iter().enumerate();
     let one = |(j, joint): (usize, &Joint)| {
         let held = moving_states(j, states);
-        (!held.is_empty()).then(|| {
+        // Between two joints of one body there is nothing to hold.
+        let solid = !object.parts[joint.child].faces.is_empty();
+        (!held.is_empty() && solid).then(|| {
             let grip = grip(object, joint, states[held[held.len() - 1]][j] - states[held[0]][j]);
             let unit = 1.0 / metres_per_unit;
             let outward = outward(object, joint.child, grip, states, &held, unit);

@@ -123,7 +123,7 @@ fn useful_range(object: &ArticulatedObject, joint: usize, others: &[f64]) -> Use
 }
 
 /// The part and everything it carries.
-fn subtree(object: &ArticulatedObject, part: usize) -> Vec<usize> {
+pub(super) fn subtree(object: &ArticulatedObject, part: usize) -> Vec<usize> {
     let mut out = vec![part];
     let mut next = 0;
     while next < out.len() {

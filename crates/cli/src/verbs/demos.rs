@@ -11,7 +11,7 @@ use hingecast_study::simulate::record::{self, WorldArgs};
 use hingecast_study::simulate::teleop::session::Session as TeleopSession;
 use hingecast_study::simulate::teleop::terminal::{self, Console};
 use hingecast_study::simulate::teleop::{self, Wanted};
-use hingecast_study::simulate::{may_write, object_file, replay, twin_file};
+use hingecast_study::simulate::{imported_beside, may_write, object_file, replay, twin_file};
 use std::path::{Path, PathBuf};
 
 pub fn run(session: &Session, args: &Demos) -> Result<Outcome> {
@@ -25,8 +25,10 @@ pub fn run(session: &Session, args: &Demos) -> Result<Outcome> {
     let kind = TaskKind::from_name(&args.task).unwrap_or(TaskKind::Open);
     let object = match (&args.object, &args.twin) {
         (_, Some(run)) => twin_file(run)?,
-        (Some(name), None) => object_file(name)?,
-        (None, None) => object_file(if kind == TaskKind::HingedBox { "hinged_blocks" } else { "covered_box" })?,
+        (name, None) => {
+            let default = if kind == TaskKind::HingedBox { "hinged_blocks" } else { "covered_box" };
+            object_file(&session.host(), name.as_deref().unwrap_or(default), Some(&imported_beside(out)))?
+        }
     };
     may_write(out)?;
     if args.expert == "teleop" {

@@ -17,7 +17,7 @@ use std::path::Path;
 
 pub fn run(session: &Session, args: &Rollout) -> Result<Outcome> {
     let policy = Policy::load(&args.policy)?;
-    let truth = args.object.as_deref().map(object_file).transpose()?;
+    let truth = args.object.as_deref().map(|o| object_file(&session.host(), o, None)).transpose()?;
     let twin = args.twin.as_deref().map(twin_file).transpose()?;
     // A typo is noticed now and not after the episodes.
     let spoils = args.spoil.iter().map(|text| Ok((text, Spoil::read(text)?))).collect::<Result<Vec<_>>>()?;

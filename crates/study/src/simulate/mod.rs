@@ -6,19 +6,40 @@ pub mod rollout;
 mod strip;
 pub mod teleop;
 
+use crate::host::Host;
 use hingecast::failure::{Failure, Result};
+use hingecast::import_object::{ImportConfig, import};
 use hingecast_capture::object::ArticulatedObject;
 use std::path::{Path, PathBuf};
 
-/// The model file behind `--object`: a path, or the name of a sample.
+/// The model file behind `--object`: a path, or the name of a sample. A PartNet-Mobility folder is
+/// made fit for the simulator first, as `hingecast import-object` does it, in the folder `imported`.
+/// Without one it is refused.
 ///
 /// # Errors
-/// When nothing of that name is there.
-pub fn object_file(argument: &str) -> Result<PathBuf> {
+/// When nothing of that name is there, or it cannot be imported.
+pub fn object_file(host: &Host, argument: &str, imported: Option<&Path>) -> Result<PathBuf> {
     if argument == hingecast_sim::object::HINGED_BLOCKS {
         return Ok(PathBuf::from(argument));
     }
-    absolute(&hingecast_sim::object::model_file(&ArticulatedObject::resolve(argument)?)?)
+    let path = ArticulatedObject::resolve(argument)?;
+    let raw = path.join("mobility.urdf").is_file() || path.file_name().is_some_and(|n| n == "mobility.urdf");
+    if !raw {
+        return absolute(&hingecast_sim::object::model_file(&path)?);
+    }
+    let Some(imported) = imported else {
+        let hint = format!("hingecast import-object {argument} -o FOLDER, then --object FOLDER");
+        return Err(Failure::new("a PartNet-Mobility object must be imported first", path.display().to_string(), hint));
+    };
+    let made = import(&path, imported, &ImportConfig::default(), &host.watcher.stage("import"))?;
+    host.watcher.say(&format!("{} was imported into {}", path.display(), imported.display()));
+    made.changes.iter().for_each(|c| host.watcher.say(&format!("  changed: {c}")));
+    absolute(&imported.join("robot.xml"))
+}
+
+/// Where [`object_file`] imports to, beside a file of demonstrations: `d.hdf5` -> `d.object`.
+pub fn imported_beside(demos: &Path) -> PathBuf {
+    demos.with_extension("object")
 }
 
 /// The model file behind `--twin`: a run, its twin folder, or the file itself.
