@@ -55,6 +55,15 @@ pub enum Doubt {
     },
     /// Two states only: parts that moved alike cannot be told apart.
     TwoStates,
+    /// Its values are a function of another joint's, in too few states to be sure.
+    MayFollow {
+        /// Name of the joint.
+        joint: String,
+        /// Name of the joint that it may follow.
+        leader: String,
+        /// How much the recording tells it.
+        nats: f64,
+    },
     /// Anything else, as a sentence.
     Other {
         /// What a person reads.
@@ -69,6 +78,7 @@ impl Doubt {
             Self::Undecidable { joint, .. }
             | Self::LooseAxis { joint, .. }
             | Self::LoosePivot { joint, .. }
+            | Self::MayFollow { joint, .. }
             | Self::Unseen { joint, .. } => Some(joint),
             Self::TwoPieces { part, .. } => Some(part),
             Self::NothingMoves | Self::Unexplained { .. } | Self::TwoStates | Self::Other { .. } => None,
@@ -77,10 +87,16 @@ impl Doubt {
 
     /// The same about a joint that has got another name.
     pub fn renamed(mut self, old: &str, new: &str) -> Self {
+        if let Self::MayFollow { leader, .. } = &mut self {
+            if leader == old {
+                *leader = new.to_string();
+            }
+        }
         match &mut self {
             Self::Undecidable { joint, .. }
             | Self::LooseAxis { joint, .. }
             | Self::LoosePivot { joint, .. }
+            | Self::MayFollow { joint, .. }
             | Self::Unseen { joint, .. }
                 if joint == old =>
             {
@@ -123,6 +139,11 @@ impl fmt::Display for Doubt {
                 "{:.1} % of the surface moved in a way that no part explains (soft, or too small a part, or frames that \
                  differ)",
                 100.0 * share
+            ),
+            Self::MayFollow { joint, leader, nats } => write!(
+                f,
+                "joint '{joint}' may follow '{leader}': in every state their values fit one line or curve ({nats:.1} nats, 10 \
+                 would do); if that is so, record more states, and if not, move one of them alone"
             ),
             Self::TwoStates => write!(
                 f,

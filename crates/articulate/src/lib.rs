@@ -11,6 +11,7 @@
 //! search      parts one after another: candidates, ranked by what they explain
 //! passes      the list of named passes from a discovery to the final estimate
 //! label       which part every piece of surface belongs to
+//! coupling    joints that are a function of each other
 //! doubt       what a person should know before believing the joints
 //! pictures    noisy recordings: joints by pictures and depth together
 //! classical   the other method (`--method track`), for comparison
@@ -28,6 +29,7 @@
 
 pub mod classical;
 mod config;
+pub mod coupling;
 mod depths;
 pub mod doubt;
 mod error;

@@ -4,6 +4,7 @@
 use crate::artifacts::Joints;
 use crate::failure::{Failure, Result};
 use glam::DVec3;
+use hingecast_articulate::Doubt;
 use hingecast_geom::JointKind;
 use serde::{Deserialize, Serialize};
 
@@ -31,6 +32,9 @@ pub struct JointOverride {
     /// Degrees for hinges, scene units for slides, from the first state's value.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub limits: Option<[f64; 2]>,
+    /// It follows no other joint, whatever the recording says.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub independent: Option<bool>,
 }
 
 /// Applies the entries in order.
@@ -43,6 +47,17 @@ pub fn apply(file: &mut Joints, entries: &[JointOverride]) -> Result<()> {
         one(file, entry).map_err(|(what, hint)| Failure::new(what, format!("[[joint]] number {}", k + 1), hint))?;
     }
     file.tree.validate().map_err(|e| Failure::new(e, "[[joint]]", "change 'parent'"))
+}
+
+/// Takes out what a person says is no coupling, and the doubts about it.
+pub fn uncouple(file: &mut Joints, entries: &[JointOverride]) {
+    for entry in entries.iter().filter(|e| e.independent == Some(true)) {
+        let name = entry.name.as_ref().unwrap_or(&entry.joint);
+        if let Some(j) = file.tree.joints.iter().position(|joint| joint.name == *name) {
+            file.tree.couplings.retain(|c| c.follower != j);
+        }
+        file.doubts.retain(|d| !matches!(d, Doubt::MayFollow { joint, .. } if joint == name));
+    }
 }
 
 fn one(file: &mut Joints, entry: &JointOverride) -> std::result::Result<(), (String, String)> {

@@ -101,6 +101,16 @@ fn joints(out: &mut String, content: &Content) {
         );
     }
     let _ = write!(out, "</table>");
+    for c in &tree.couplings {
+        let [a, b] = [c.follower, c.leader].map(|j| escape(&tree.joints[j].name));
+        let terms = c.polynomial.iter().enumerate().filter(|(k, x)| *k < 2 || **x != 0.0);
+        let terms: Vec<String> = terms.map(|(k, x)| format!("{x:+.4} q<sup>{k}</sup>")).collect();
+        let _ = write!(
+            out,
+            "<p><b>{a}</b> follows <b>{b}</b>: its value is {} of the other's q (radians, units).</p>",
+            terms.join(" ")
+        );
+    }
 }
 
 /// Four cells: standard deviations of axis, pivot and values; what else the joint might be.

@@ -3,6 +3,7 @@
 use crate::artifacts::{Joints, Parts, Splats};
 use crate::failure::Result;
 use crate::overrides::{self, JointOverride};
+use hingecast_articulate::coupling;
 
 /// `corrections`: the `[[joint]]` entries of the settings, in order.
 ///
@@ -17,5 +18,9 @@ pub fn run(parts: &Parts, splats: &Splats, corrections: &[JointOverride]) -> Res
         certainty: parts.certainty.iter().cloned().map(Some).collect(),
     };
     overrides::apply(&mut joints, corrections)?;
+    let (couplings, doubts) = coupling::find(&joints.tree, &joints.certainty, splats.extent.diagonal);
+    joints.tree.couplings = couplings;
+    joints.doubts.extend(doubts);
+    overrides::uncouple(&mut joints, corrections);
     Ok(joints)
 }
