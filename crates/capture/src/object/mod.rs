@@ -6,6 +6,7 @@
 mod mesh_file;
 mod mjcf;
 pub(crate) mod shapes;
+mod text;
 pub(crate) mod texture;
 mod urdf;
 mod xml;
@@ -40,6 +41,8 @@ pub struct ArticulatedObject {
     pub materials: Vec<Material>,
     /// What the materials refer to.
     pub textures: Vec<Texture>,
+    /// What was left out or assumed when it was loaded, one sentence each.
+    pub notes: Vec<String>,
 }
 
 /// The triangles of one part, canonical world frame. Vertex arrays have one length.
@@ -76,8 +79,12 @@ impl ArticulatedObject {
     /// When nothing is found, or the description or one of its meshes cannot be read.
     pub fn load(path: &Path) -> Result<Self, CaptureError> {
         let file = if path.is_dir() { description_in(path)? } else { path.to_path_buf() };
-        let text = std::fs::read_to_string(&file).map_err(|e| CaptureError::read(&file, e))?;
+        let text = text::read(&file)?;
         let xml = roxmltree::Document::parse(&text).map_err(|e| {
+            // Without its namespace, xacro is not even XML.
+            if matches!(&e, roxmltree::Error::UnknownNamespace(prefix, _) if prefix == "xacro") {
+                return urdf::not_expanded(&file);
+            }
             let hint = "open it in an XML editor at that line, or export it again";
             CaptureError::new(format!("the object file is not XML: {e}"), file.display().to_string(), hint)
         })?;
@@ -152,12 +159,34 @@ impl ArticulatedObject {
             }
             self.tree.parts.push(unique);
         }
-        (self.materials, self.textures) = (library.materials, library.textures);
+        (self.materials, self.textures, self.notes) = (library.materials, library.textures, library.notes);
         self.tree.validate()?;
         if self.parts.iter().all(|p| p.faces.is_empty()) {
             return Err("the object has no visible surface".into());
         }
+        if let Some(joint) = self.moves_nothing() {
+            let part = &self.tree.parts[joint.child];
+            return Err(format!("the part '{part}', which the joint '{}' moves, has no surface", joint.name));
+        }
+        let far = |v: &Vec3| !(v.abs().max_element() <= mesh_file::FARTHEST);
+        if let Some((part, _)) = self.tree.parts.iter().zip(&self.parts).find(|(_, p)| p.vertices.iter().any(far)) {
+            return Err(format!("the part '{part}' reaches farther than {:e}", mesh_file::FARTHEST));
+        }
         Ok(self)
+    }
+
+    /// A joint without a surface on its part and on all that hang on it. A part of its own without
+    /// surface is usual: two joints in a row, the slide and the turn of a lid.
+    fn moves_nothing(&self) -> Option<&hingecast_geom::Joint> {
+        let mut moved: Vec<bool> = self.parts.iter().map(|p| !p.faces.is_empty()).collect();
+        for start in 0..moved.len() {
+            let mut at = start;
+            while let Some(joint) = self.tree.joints.iter().find(|j| moved[at] && j.child == at) {
+                moved[joint.parent] = true;
+                at = joint.parent;
+            }
+        }
+        self.tree.joints.iter().find(|j| !moved[j.child])
     }
 
     /// All vertices with the parts at `poses` (world_from_canonical).
@@ -231,7 +260,7 @@ impl PartGeometry {
     /// Keeps one of several faces over the same three corners. PartNet stores each face twice with
     /// opposite winding, and two coincident colours would flicker.
     pub(crate) fn drop_duplicate_faces(&mut self) {
-        let key = |v: Vec3| (v * 1e5).round().as_ivec3().to_array();
+        let key = |v: Vec3| (v * 1e5).round().as_i64vec3().to_array();
         let mut seen = std::collections::HashSet::new();
         let keep: Vec<bool> = self
             .faces
