@@ -103,7 +103,8 @@ fn injure(bytes: &mut Vec<u8>, rng: &mut Rng) {
     }
     let n = bytes.len();
     let at = rng.usize(..n);
-    let range = at..(at + 1 + rng.usize(..=(n - at - 1).min(1 << rng.usize(..10)))).min(n);
+    let most = (n - at - 1).min(1 << rng.usize(..10));
+    let range = at..(at + 1 + rng.usize(..=most)).min(n);
     match rng.usize(..12) {
         0 => bytes[at] ^= 1 << rng.u32(..8),
         1 => bytes[at] = rng.u8(..),
@@ -150,7 +151,10 @@ fn number(bytes: &mut Vec<u8>, at: usize, rng: &mut Rng) {
     let start = bytes[..start].iter().rposition(|b| !digit(b)).map_or(0, |i| i + 1);
     let end = bytes[start..].iter().position(|b| !digit(b) && *b != b'.').map_or(bytes.len(), |i| start + i);
     let text = match rng.usize(..4) {
-        0 => rng.u64(..1 << rng.u32(1..40)).to_string(),
+        0 => {
+            let bits = rng.u32(1..40);
+            rng.u64(..1 << bits).to_string()
+        }
         _ => rng.choice(NUMBERS).expect("some").to_string(),
     };
     bytes.splice(start..end, text.bytes());

@@ -72,6 +72,7 @@ fn chest() -> KinematicTree {
     KinematicTree {
         parts: vec!["chest".into(), "lid".into()],
         joints: vec![Joint { name, parent: 0, child: 1, screw, values, limits }],
+        ..Default::default()
     }
 }
 

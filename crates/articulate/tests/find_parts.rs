@@ -55,7 +55,7 @@ fn equal_drawers_one_after_another() {
 
 #[test]
 fn what_never_moves_is_one_part() {
-    let still = KinematicTree { parts: vec!["all".into()], joints: Vec::new() };
+    let still = KinematicTree { parts: vec!["all".into()], ..Default::default() };
     let found = Scene::new(vec![cupboard().concat()], still).coarse().find();
     assert!(found.tree.joints.is_empty());
     assert_eq!(found.doubts[0], Doubt::NothingMoves);

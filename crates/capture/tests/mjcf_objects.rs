@@ -5,7 +5,7 @@ use glam::{DQuat, DVec3};
 use hingecast_capture::Truth;
 use hingecast_capture::object::ArticulatedObject;
 use hingecast_capture::synth::{SynthConfig, synth, useful_ranges};
-use hingecast_geom::{JointKind, Progress};
+use hingecast_geom::{Coupling, JointKind, Progress};
 
 const LAMP: &str = r#"<mujoco model="lamp">
   <compiler angle="degree"/>
@@ -170,4 +170,70 @@ fn a_urdf_link_is_the_child_of_one_joint() {
         let e = robot(wrong).unwrap_err();
         assert!(e.what.contains("child of two joints"), "{e}");
     }
+}
+
+/// Skipped in silence, each of these made another object of it.
+#[test]
+fn what_this_reader_does_not_understand_is_refused_with_its_line() {
+    let base = |inner: &str| format!("<mujoco>\n{inner}\n<worldbody><geom size=\"0.1\"/></worldbody></mujoco>");
+    let body = |inner: &str| format!("<mujoco>\n<worldbody><geom size=\"0.1\"/>{inner}</worldbody></mujoco>");
+    let cases = [
+        (body(r#"<frame pos="0 0 1"/>"#), "<frame>"),
+        (body(r#"<include file="door.xml"/>"#), "<include>"),
+        (body(r#"<replicate count="2"/>"#), "<replicate>"),
+        (body(r#"<body><attach model="m"/></body>"#), "<attach>"),
+        (body(r#"<body><joint ref="0.1"/></body>"#), "ref="),
+        (body(r#"<body><joint limited="false"/></body>"#), "limited="),
+        (body(r#"<geom type="capsule" mesh="m"/>"#), "fitted"),
+        (base(r#"<compiler eulerseq="zyx"/>"#), "eulerseq="),
+        (base(r#"<equality><joint joint1="a"/></equality>"#), "<equality>"),
+        (base(r#"<asset><mesh name="m" vertex="0 0 0"/></asset>"#), "vertex="),
+        (base(r#"<asset><mesh name="m" file="m.obj" refpos="0 0 1"/></asset>"#), "refpos="),
+        (base("<deformable/>"), "<deformable>"),
+    ];
+    for (text, says) in cases {
+        let e = load(&text).unwrap_err();
+        assert!(e.what.contains(says) && e.place.contains("object.xml:2"), "{says}: {e}");
+    }
+}
+
+#[test]
+fn settings_add_up_and_ghosts_are_not_seen() {
+    let settings = r#"<compiler angle="degree"/><compiler angle="radian"/>"#;
+    let ghosts = r#"<geom size="9" rgba="1 0 0 0"/><geom size="9" material="air"/>"#;
+    let asset = r#"<asset><material name="air" rgba="1 1 1 0"/></asset>"#;
+    let body = r#"<body><joint range="-1.6 0"/><geom size="0.1"/></body>"#;
+    let object = load(&format!("<mujoco>{settings}{asset}<worldbody>{ghosts}{body}</worldbody></mujoco>")).unwrap();
+    assert_eq!(object.tree.joints[0].limits, [-1.6, 0.0]);
+    assert!(object.diagonal() < 1.0, "{}", object.diagonal());
+}
+
+/// Two doors that open together: recorded so, whatever the play says, and only as far as both can.
+#[test]
+fn joints_that_follow_others_are_played_together() {
+    let door = |name: &str, x: f64, range: &str| {
+        let joint = format!(r#"<joint name="{name}" axis="0 0 1" range="{range}"/>"#);
+        let leaf = format!(r#"<geom type="box" size="0.09 0.005 0.2" pos="{} -0.22 0.2"/>"#, -0.5 * x);
+        format!(r#"<body name="{name}_door" pos="{x} 0 0">{joint}{leaf}</body>"#)
+    };
+    let case = r#"<geom type="box" size="0.2 0.2 0.01"/>"#;
+    let doors = door("left", -0.2, "-90 0") + &door("right", 0.2, "0 45");
+    let mut object = load(&format!("<mujoco><worldbody>{case}{doors}</worldbody></mujoco>")).unwrap();
+    object.tree.couplings.push(Coupling { follower: 1, leader: 0, polynomial: [0.0, -1.0, 0.0, 0.0, 0.0] });
+    let ranges = useful_ranges(&object);
+    let open = ranges[0].lower.min(ranges[0].upper);
+    assert!((open + 45f64.to_radians()).abs() < 0.02, "as far as the right one can: {ranges:?}");
+    let dir = tempfile::tempdir().unwrap();
+    let out = dir.path().join("rec");
+    let mut config = SynthConfig { states: 5, views: 1, test_views: 0, size: 16, ..SynthConfig::default() };
+    synth(&object, &config, &out, &Progress::default()).unwrap();
+    let truth = Truth::open(&Truth::folder_of(&out)).unwrap();
+    let [left, right] = &truth.tree.joints[..] else { panic!("{:?}", truth.tree.joints) };
+    assert!(left.values.iter().any(|q| *q < -0.5), "{:?}", left.values);
+    for (l, r) in left.values.iter().zip(&right.values) {
+        assert!((l + r).abs() < 1e-12, "{l} {r}");
+    }
+    config.ranges.insert("right".into(), [0.0, 0.1]);
+    let e = synth(&object, &config, &out, &Progress::default()).unwrap_err();
+    assert!(e.what.contains("follows 'left'"), "{e}");
 }

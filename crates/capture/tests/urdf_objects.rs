@@ -77,7 +77,7 @@ fn meshes_are_found_by_package_and_by_backslashes() {
 #[test]
 fn what_moves_has_a_surface() {
     let error = refused(cabinet(BOX, "", HINGE));
-    assert!(error.contains("'door'") && error.contains("'hinge'") && error.contains("no surface"), "{error}");
+    assert!(error.contains("'door'") && error.contains("'hinge'") && error.contains("no visible surface"), "{error}");
     let flat = r#"<visual><geometry><box size="0 0 0"/></geometry></visual>"#;
     assert!(refused(cabinet(BOX, flat, HINGE)).contains("'door'"));
     // Two joints in a row, with nothing between them.
@@ -166,7 +166,7 @@ fn joints_are_complete_or_named() {
     }
     let still = loaded(cabinet(BOX, BOX, &HINGE.replace("-1.7", "0")));
     assert_eq!(still.tree.joints[0].limits, [0.0, 0.0]);
-    assert!(still.notes[0].contains("joint hinge does not move"), "{:?}", still.notes);
+    assert!(still.notes[0].contains("'hinge' does not move"), "{:?}", still.notes);
     let capsule = r#"<visual><geometry><capsule radius="0.1" length="0.4"/></geometry></visual>"#;
     let object = loaded(cabinet(BOX, capsule, HINGE));
     let (lo, hi) = object.parts[1].vertices.iter().fold((0f32, 0f32), |(lo, hi), v| (lo.min(v.z), hi.max(v.z)));
@@ -174,7 +174,7 @@ fn joints_are_complete_or_named() {
 }
 
 #[test]
-fn followers_are_named_with_the_joint_that_leads() {
+fn followers_follow_the_joint_that_leads() {
     let joint = |name: &str, mimic: &str| {
         format!(
             r#"<link name="l_{name}">{BOX}</link><joint name="{name}" type="continuous"><parent link="case"/>
@@ -184,10 +184,16 @@ fn followers_are_named_with_the_joint_that_leads() {
     let chain = joint("c", r#"<mimic joint="b" multiplier="2" offset="1"/>"#)
         + &joint("b", r#"<mimic joint="a" multiplier="-3" offset="0.5"/>"#)
         + &joint("a", "");
-    let object = loaded(cabinet(BOX, BOX, &format!("{HINGE}{chain}")));
+    let tree = loaded(cabinet(BOX, BOX, &format!("{HINGE}{chain}"))).tree;
+    let led: Vec<_> =
+        tree.couplings.iter().map(|c| (&*tree.joints[c.follower].name, &*tree.joints[c.leader].name)).collect();
+    assert_eq!(led, [("c", "a"), ("b", "a")]);
     // 2 (-3 a + 0.5) + 1
-    assert!(object.notes.iter().any(|n| n.contains("joint c follows joint a: c = -6 * a + 2")), "{:?}", object.notes);
-    assert!(object.notes.iter().any(|n| n.contains("joint b follows joint a: b = -3 * a + 0.5")), "{:?}", object.notes);
+    assert_eq!([0, 1].map(|k| tree.couplings[k].line().unwrap()), [[2.0, -6.0], [0.5, -3.0]]);
+    let fixed = joint("a", "").replace("continuous", "fixed") + &joint("b", r#"<mimic joint="a" offset="0.5"/>"#);
+    let object = loaded(cabinet(BOX, BOX, &format!("{HINGE}{fixed}")));
+    assert_eq!((object.tree.couplings.len(), object.tree.joints[1].limits), (0, [0.5, 0.5]));
+    assert!(object.notes[0].contains("follows 'a', which is fixed"), "{:?}", object.notes);
     let circle = joint("b", r#"<mimic joint="a"/>"#) + &joint("a", r#"<mimic joint="b"/>"#);
     assert!(refused(cabinet(BOX, BOX, &format!("{HINGE}{circle}"))).contains("in a circle"));
     let itself = joint("a", r#"<mimic joint="a"/>"#);
@@ -214,7 +220,7 @@ fn partnet_meshes_that_never_existed_are_left_out() {
     let urdf = cabinet(&there, &mesh("textured_objs/b.obj"), HINGE);
     let object = load(&dir.path().join("mobility.urdf"), &urdf).unwrap();
     assert!(object.tree.joints.is_empty() && object.parts.len() == 1);
-    assert!(object.notes.iter().any(|n| n.contains("joint hinge stays at 0")), "{:?}", object.notes);
+    assert!(object.notes.iter().any(|n| n.contains("'hinge' stays at 0")), "{:?}", object.notes);
 }
 
 /// Origin and rows of the rotation of every part's first link, with the joints at 0.

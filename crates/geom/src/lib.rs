@@ -49,4 +49,4 @@ pub use mesh::TriMesh;
 pub use nearest::PointTree;
 pub use pose::Pose;
 pub use progress::{Cancelled, Progress};
-pub use tree::{Certainty, Joint, JointKind, KinematicTree, Screw};
+pub use tree::{Certainty, Coupling, Joint, JointKind, KinematicTree, Screw};

@@ -101,6 +101,30 @@ pub struct Certainty {
     pub nats: f64,
 }
 
+/// One joint's value is a function of another's: URDF's `<mimic>`, MJCF's `<equality><joint>`.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Coupling {
+    /// Joint id of the one that follows; of each joint at most one.
+    pub follower: usize,
+    /// Joint id of the one that it follows.
+    pub leader: usize,
+    /// Follower's value = sum of `polynomial[k] * leader^k`, radians or scene units.
+    pub polynomial: [f64; 5],
+}
+
+impl Coupling {
+    /// The follower's value when the leader stands at `q` (Horner).
+    pub fn value(&self, q: f64) -> f64 {
+        self.polynomial.iter().rev().fold(0.0, |sum, c| sum * q + c)
+    }
+
+    /// Offset and multiplier, where the function is a line (all that URDF can say).
+    pub fn line(&self) -> Option<[f64; 2]> {
+        let [offset, multiplier, higher @ ..] = self.polynomial;
+        (higher == [0.0; 3]).then_some([offset, multiplier])
+    }
+}
+
 /// Parts and joints. Each part but the roots is the child of exactly one joint.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct KinematicTree {
@@ -108,6 +132,10 @@ pub struct KinematicTree {
     pub parts: Vec<String>,
     /// In any order; index = joint id.
     pub joints: Vec<Joint>,
+    /// Which joints follow others. [`Self::poses`] takes the values it is given:
+    /// [`Self::follow`] makes them consistent.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub couplings: Vec<Coupling>,
 }
 
 impl KinematicTree {
@@ -153,6 +181,22 @@ impl KinematicTree {
         self.poses(&self.values_at(state))
     }
 
+    /// Sets the values of the joints that follow others; those of the others stay.
+    ///
+    /// # Panics
+    /// When `q` is shorter than the joints.
+    pub fn follow(&self, q: &mut [f64]) {
+        // Chains are as long as there are couplings, at most.
+        for _ in 0..self.couplings.len() {
+            self.couplings.iter().for_each(|c| q[c.follower] = c.value(q[c.leader]));
+        }
+    }
+
+    /// The coupling by which joint `j` follows another.
+    pub fn coupling_of(&self, j: usize) -> Option<&Coupling> {
+        self.couplings.iter().find(|c| c.follower == j)
+    }
+
     /// Checks the invariants; the message names the offending joint.
     ///
     /// # Errors
@@ -184,6 +228,23 @@ impl KinematicTree {
                 }
             }
         }
+        self.validate_couplings()
+    }
+
+    fn validate_couplings(&self) -> Result<(), String> {
+        let n = self.joints.len();
+        for (i, c) in self.couplings.iter().enumerate() {
+            if c.follower >= n || c.leader >= n || !c.polynomial.iter().all(|x| x.is_finite()) {
+                return Err(format!("joint {} cannot follow joint {} of {n}", c.follower, c.leader));
+            }
+            if self.couplings[..i].iter().any(|other| other.follower == c.follower) {
+                return Err(format!("joint '{}' follows two joints", self.joints[c.follower].name));
+            }
+            let up = |j: &usize| self.coupling_of(*j).map(|c| c.leader);
+            if std::iter::successors(Some(c.leader), up).take(n + 1).any(|j| j == c.follower) {
+                return Err(format!("joint '{}' follows itself", self.joints[c.follower].name));
+            }
+        }
         Ok(())
     }
 }
@@ -203,6 +264,7 @@ mod tests {
         let tree = KinematicTree {
             parts: ["base", "upper", "fore"].map(String::from).to_vec(),
             joints: vec![hinge(0, 1, DVec3::ZERO), hinge(1, 2, DVec3::X)],
+            ..Default::default()
         };
         tree.validate().unwrap();
         // Elbow bent back by 90 deg on a shoulder turned by 90 deg: the hand at (2,0,0) ends at
@@ -215,8 +277,31 @@ mod tests {
     fn cycles_and_double_parents_are_refused() {
         let parts = ["a", "b", "c"].map(String::from).to_vec();
         let cycle = vec![hinge(1, 2, DVec3::ZERO), hinge(2, 1, DVec3::ZERO)];
-        assert!(KinematicTree { parts: parts.clone(), joints: cycle }.validate().is_err());
+        assert!(KinematicTree { parts: parts.clone(), joints: cycle, ..Default::default() }.validate().is_err());
         let twice = vec![hinge(0, 2, DVec3::ZERO), hinge(1, 2, DVec3::ZERO)];
-        assert!(KinematicTree { parts, joints: twice }.validate().is_err());
+        assert!(KinematicTree { parts, joints: twice, ..Default::default() }.validate().is_err());
+    }
+
+    #[test]
+    fn followers_follow_along_chains_and_never_themselves() {
+        let joints = vec![hinge(0, 1, DVec3::ZERO), hinge(0, 2, DVec3::X), hinge(0, 3, DVec3::Y)];
+        let coupling = |follower, leader, polynomial| Coupling { follower, leader, polynomial };
+        let mut tree = KinematicTree {
+            parts: ["a", "b", "c", "d"].map(String::from).to_vec(),
+            joints,
+            // The chain's end comes first.
+            couplings: vec![coupling(0, 1, [0.1, -1.0, 0.0, 0.0, 0.0]), coupling(1, 2, [0.0, 0.0, 2.0, 0.0, 0.0])],
+        };
+        tree.validate().unwrap();
+        let mut q = [9.0, 9.0, 0.5];
+        tree.follow(&mut q);
+        assert_eq!(q, [0.1 - 0.5, 0.5, 0.5]);
+        assert_eq!((tree.couplings[0].line(), tree.couplings[1].line()), (Some([0.1, -1.0]), None));
+        tree.couplings.push(coupling(2, 0, [0.0; 5]));
+        assert!(tree.validate().unwrap_err().contains("follows itself"));
+        tree.couplings[2] = coupling(1, 0, [0.0; 5]);
+        assert!(tree.validate().unwrap_err().contains("follows two"));
+        tree.couplings[2] = coupling(7, 0, [0.0; 5]);
+        assert!(tree.validate().is_err());
     }
 }

@@ -67,8 +67,8 @@ pub struct Imported {
 pub fn import(source: &Path, out: &Path, config: &ImportConfig, progress: &Progress) -> Result<Imported> {
     may_become("output folder", out, &["twin.json"], "give a new folder")?;
     may_be_emptied("output folder", out, &hingecast_twin::is_ours, "give a new folder, or empty this one yourself")?;
-    let mut object = ArticulatedObject::load(source)?;
-    let mut changes = Vec::new();
+    let mut object = crate::objects::load(source)?;
+    let mut changes = std::mem::take(&mut object.notes);
     // The ranges that `synth` plays: files let doors swing through their cabinets.
     let useful = useful_ranges(&object);
     for (joint, range) in object.tree.joints.iter_mut().zip(&useful) {
@@ -85,6 +85,10 @@ pub fn import(source: &Path, out: &Path, config: &ImportConfig, progress: &Progr
     rescale(&mut object, config.scale);
     if config.scale != 1.0 {
         changes.push(format!("all lengths times {}", config.scale));
+    }
+    for c in object.tree.couplings.iter().filter(|c| c.line().is_none()) {
+        let [a, b] = [c.follower, c.leader].map(|j| object.tree.joints[j].name.as_str());
+        changes.push(format!("joint '{a}' follows '{b}' along a curve: robot.xml says so, robot.urdf cannot"));
     }
     let merged: Vec<String> = object
         .tree
@@ -162,6 +166,12 @@ pub fn import(source: &Path, out: &Path, config: &ImportConfig, progress: &Progr
 fn rescale(object: &mut ArticulatedObject, scale: f64) {
     for part in &mut object.parts {
         part.vertices.iter_mut().for_each(|v| *v *= scale as f32);
+    }
+    let length = |j: usize| if object.tree.joints[j].screw.kind.turns() { 1.0 } else { scale };
+    let units: Vec<f64> = (0..object.tree.joints.len()).map(length).collect();
+    for c in &mut object.tree.couplings {
+        let (follower, leader) = (units[c.follower], units[c.leader]);
+        c.polynomial = std::array::from_fn(|k| c.polynomial[k] * follower / leader.powi(k as i32));
     }
     for joint in &mut object.tree.joints {
         joint.screw.pivot *= scale;

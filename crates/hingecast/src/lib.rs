@@ -25,6 +25,7 @@
 //! | [`artifacts`] | the files of a run, one struct, one reader and one writer each |
 //! | [`config`], [`overrides`] | settings; a person's corrections of joints |
 //! | [`eval`] | a run against the truth: the only code that opens a truth folder |
+//! | [`objects`] | objects of others, as their own simulators understand them |
 //! | [`report`] | the page of a run |
 //!
 //! Parts and joints are found by `hingecast_articulate::find`, which can be called on depth images
@@ -42,6 +43,7 @@ pub mod eval;
 pub mod failure;
 pub mod import_object;
 pub mod memory;
+pub mod objects;
 pub mod overrides;
 pub mod report;
 pub mod run_files;

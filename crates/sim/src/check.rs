@@ -1,6 +1,7 @@
 //! Loads a model, drives every joint over its range, lets it rest for two seconds, and notes what
 //! goes wrong (metrics.md, "Simulator").
 
+use crate::compiled::couplings::followers;
 use crate::object::joint_range;
 use crate::{SimError, log};
 use mujoco_rs::prelude::*;
@@ -139,19 +140,30 @@ fn finite(data: &MjData<&MjModel>) -> bool {
         && data.warning().iter().all(|w| w.number == 0)
 }
 
-/// Drives one joint from end to end by a stiff servo, all others held where they start.
+/// Drives one joint from end to end by a stiff servo, all others held where they start, but for
+/// those that follow it. A joint that follows another is not driven.
 fn sweep(model: &MjModel, joint: usize, config: &CheckConfig, all_finite: &mut bool) -> Option<JointSweep> {
     let speed = match model.jnt_type()[joint] {
         MjtJoint::mjJNT_HINGE => config.hinge_speed,
         MjtJoint::mjJNT_SLIDE => config.slide_speed,
         _ => return None,
     };
+    let couplings = followers(model);
+    if couplings.iter().any(|(follower, ..)| *follower == joint) {
+        return None;
+    }
     let range = joint_range(model, joint);
     let mut data = MjData::new(model);
     let nv = model.ffi().nv as usize;
     let dof = model.jnt_dofadr()[joint] as usize;
     let address = model.jnt_qposadr()[joint] as usize;
     data.qpos_mut()[address] = range[0];
+    for _ in &couplings {
+        for (follower, leader, polynomial) in &couplings {
+            let [to, from] = [follower, leader].map(|j| model.jnt_qposadr()[*j] as usize);
+            data.qpos_mut()[to] = polynomial.iter().rev().fold(0.0, |sum, c| sum * data.qpos()[from] + c);
+        }
+    }
     data.forward();
     let start: Vec<f64> = data.qpos().to_vec();
     let dt = model.opt().timestep;
@@ -164,6 +176,8 @@ fn sweep(model: &MjModel, joint: usize, config: &CheckConfig, all_finite: &mut b
     };
     // Computed-torque servo: bias forces are cancelled, the error obeys a critically damped 10 Hz
     // spring.
+    // What follows is left to the constraint.
+    let follows: Vec<usize> = couplings.iter().map(|(f, ..)| model.jnt_dofadr()[*f] as usize).collect();
     let omega = std::f64::consts::TAU * 10.0;
     let mut mass = vec![0.0; nv * nv];
     for k in 0..=steps {
@@ -174,6 +188,9 @@ fn sweep(model: &MjModel, joint: usize, config: &CheckConfig, all_finite: &mut b
             .map(|d| {
                 let wanted = if d == dof { range[0] + t * (range[1] - range[0]) } else { start[d] };
                 let velocity = if d == dof && t < 1.0 { speed } else { 0.0 };
+                if follows.contains(&d) {
+                    return 0.0;
+                }
                 omega * omega * (wanted - data.qpos()[d]) + 2.0 * omega * (velocity - data.qvel()[d])
             })
             .collect();

@@ -1,7 +1,8 @@
 //! MuJoCo, the simulator of this field: tries what `twin` wrote before a user does, and lets an arm
 //! act on it.
 //!
-//! `check` loads a model, sweeps its joints and says what is wrong. The rest is a world with an
+//! `check` loads a model, sweeps its joints and says what is wrong. `compiled` reads MJCF as MuJoCo
+//! understands it, for `synth`. The rest is a world with an
 //! arm: `object` and `scene` load an object or its twin onto a table, `grasp` finds where it can be
 //! held, `task` says what shall be done, `env` steps, observes and judges, `control` is the arm's
 //! control law, `expert` demonstrates, `spoil` makes wrong objects on purpose, `path` says whether
@@ -10,6 +11,7 @@
 #![warn(missing_docs)]
 
 pub mod check;
+pub mod compiled;
 pub mod control;
 pub mod env;
 mod error;

@@ -96,6 +96,12 @@ pub(crate) fn joint_range(model: &MjModel, joint: usize) -> [f64; 2] {
     if model.jnt_limited()[joint] { model.jnt_range()[joint] } else { [0.0, std::f64::consts::TAU] }
 }
 
+/// The name of something in the model, or its kind and number.
+pub(crate) fn name_or(model: &MjModel, kind: MjtObjBase, id: usize, word: &str) -> String {
+    let own = model.id_to_name(kind, id).filter(|n| !n.is_empty());
+    own.map_or_else(|| format!("{word}_{id}"), String::from)
+}
+
 /// Whether `body` is `root` or hangs on it.
 pub(crate) fn hangs_on(model: &MjModel, body: usize, root: usize) -> bool {
     let mut at = body;

@@ -84,7 +84,8 @@ fn listed(folder: &Path) -> Vec<String> {
 /// An object that cannot be loaded, an output folder that holds something else, disk trouble, the
 /// wish to stop.
 pub fn record(host: &Host, object: &str, config: &SynthConfig, out: &Path) -> Result<SynthReport> {
-    let object = ArticulatedObject::load(&ArticulatedObject::resolve(object)?)?;
+    let object = hingecast::objects::load(&ArticulatedObject::resolve(object)?)?;
+    object.notes.iter().for_each(|note| host.watcher.say(&format!("note: {note}")));
     Ok(synth(&object, config, out, &host.watcher.stage("record"))?)
 }
 

@@ -35,7 +35,7 @@
 //!     Observation { state: 0, camera, depth, labels, rgb: vec![200; 3 * 96 * 96] }
 //! };
 //!
-//! let tree = KinematicTree { parts: vec!["ball".into()], joints: vec![] };
+//! let tree = KinematicTree { parts: vec!["ball".into()], ..Default::default() };
 //! let input = Input {
 //!     name: "ball",
 //!     tree: &tree,

@@ -37,7 +37,17 @@ pub fn to_string(twin: &Twin) -> String {
             escape(&twin.tree.parts[joint.child])
         );
     }
-    out + "  </contact>\n</mujoco>\n"
+    let _ = writeln!(out, "  </contact>");
+    if !twin.tree.couplings.is_empty() {
+        let _ = writeln!(out, "  <equality>");
+        for c in &twin.tree.couplings {
+            let [a, b] = [c.follower, c.leader].map(|j| escape(&twin.tree.joints[j].name));
+            let polynomial: Vec<String> = c.polynomial.iter().map(|x| format!("{x:.9}")).collect();
+            let _ = writeln!(out, "    <joint joint1=\"{a}\" joint2=\"{b}\" polycoef=\"{}\"/>", polynomial.join(" "));
+        }
+        let _ = writeln!(out, "  </equality>");
+    }
+    out + "</mujoco>\n"
 }
 
 fn body(twin: &Twin, part: usize, parent_origin: DVec3, depth: usize, out: &mut String) {

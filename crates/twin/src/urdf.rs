@@ -47,7 +47,7 @@ pub fn to_string(twin: &Twin) -> String {
         }
         let _ = writeln!(out, "  </link>");
     }
-    for joint in &twin.tree.joints {
+    for (id, joint) in twin.tree.joints.iter().enumerate() {
         let kind = match joint.screw.kind {
             JointKind::Fixed => "fixed",
             JointKind::Revolute => "revolute",
@@ -70,6 +70,14 @@ pub fn to_string(twin: &Twin) -> String {
                 "    <limit lower=\"{:.9}\" upper=\"{:.9}\" effort=\"1000\" velocity=\"10\"/>",
                 joint.limits[0], joint.limits[1]
             );
+            // URDF knows lines only; `export` says so of the others.
+            if let Some((c, [offset, multiplier])) = twin.tree.coupling_of(id).and_then(|c| Some((c, c.line()?))) {
+                let leader = escape(&twin.tree.joints[c.leader].name);
+                let _ = writeln!(
+                    out,
+                    "    <mimic joint=\"{leader}\" multiplier=\"{multiplier:.9}\" offset=\"{offset:.9}\"/>"
+                );
+            }
             let _ = writeln!(out, "    <dynamics damping=\"{:.6e}\" friction=\"0\"/>", damping(twin, joint));
         }
         let _ = writeln!(out, "  </joint>");

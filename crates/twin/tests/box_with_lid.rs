@@ -33,6 +33,7 @@ fn tree() -> KinematicTree {
             values: vec![0.0, 0.5, 1.0, 1.5],
             limits: [0.0, 1.5],
         }],
+        ..Default::default()
     }
 }
 
@@ -152,7 +153,7 @@ fn sizes_masses_and_joints_come_back() {
 /// bounds.
 #[test]
 fn a_recording_in_which_no_part_was_found_to_move_has_a_twin_of_one_part() {
-    let tree = KinematicTree { parts: vec!["base".into()], joints: Vec::new() };
+    let tree = KinematicTree { parts: vec!["base".into()], ..Default::default() };
     let input = Input {
         name: "box",
         tree: &tree,

@@ -74,6 +74,7 @@ mod tests {
                 joint(0, JointKind::Revolute, DVec3::new(0.2, 0.1, 1.0), DVec3::new(0.3, -0.1, 0.2), [0.2, 0.9]),
                 joint(1, JointKind::Prismatic, DVec3::new(1.0, 0.3, -0.2), DVec3::new(0.1, 0.5, 0.0), [0.1, 0.4]),
             ],
+            ..Default::default()
         }
     }
 

@@ -67,7 +67,8 @@ mod tests {
             joint(1, DVec3::new(1.0, 0.3, -0.2), [-0.2, -0.4, -0.9]),
             joint(2, DVec3::new(0.0, 1.0, 0.2), [0.1, 0.5, 0.7]),
         ];
-        let before = KinematicTree { parts: ["a", "b", "c", "d"].map(String::from).to_vec(), joints };
+        let before =
+            KinematicTree { parts: ["a", "b", "c", "d"].map(String::from).to_vec(), joints, ..Default::default() };
         let mut after = before.clone();
         count_from_first(&mut after);
         assert!(after.joints.iter().all(|j| j.values[0] == 0.0 && j.values.iter().sum::<f64>() > 0.0));

@@ -16,7 +16,7 @@ fn tree(tilt: f64, shift: f64, values: [f64; 3]) -> KinematicTree {
     let screw = Screw { kind: JointKind::Revolute, axis, pivot: DVec3::new(0.3 + shift, 0.1, 0.0) };
     let limits = [0.0, 1.0];
     let joint = Joint { name: "joint_1".into(), parent: 0, child: 1, screw, values: values.to_vec(), limits };
-    KinematicTree { parts: vec!["base".into(), "part_1".into()], joints: vec![joint] }
+    KinematicTree { parts: vec!["base".into(), "part_1".into()], joints: vec![joint], ..Default::default() }
 }
 
 const TRUE_VALUES: [f64; 3] = [0.0, 0.3, 0.7];
@@ -156,7 +156,7 @@ fn pictures_find_a_joint_and_a_frame() {
 fn nothing_moves_where_there_is_no_joint() {
     let mut engine = engine(600, 4.0);
     let shots = shots(&mut engine, &rig());
-    let still = KinematicTree { parts: vec!["base".into(), "part_1".into()], joints: Vec::new() };
+    let still = KinematicTree { parts: vec!["base".into(), "part_1".into()], ..Default::default() };
     let refined = refine_by_pictures(&mut engine, &shots, &still, &known(1.0), &Progress::default()).unwrap();
     assert!(refined.tree == still && refined.state_from_world == [Pose::IDENTITY; 3]);
 }

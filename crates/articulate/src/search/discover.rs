@@ -32,7 +32,7 @@ const BEAM: usize = 4;
 pub fn discover(evidence: &Evidence, max_parts: usize, seed: u64, progress: &Progress) -> Result<Discovery, Cancelled> {
     let n_states = evidence.n_states();
     let verdicts = vec![evidence.judge(&vec![Pose::IDENTITY; n_states])];
-    let tree = KinematicTree { parts: vec!["base".to_string()], joints: Vec::new() };
+    let tree = KinematicTree { parts: vec!["base".to_string()], ..Default::default() };
     let open = open_samples(&verdicts);
     let cost = PartCost::new(&verdicts[0], n_states);
     let mut front = vec![Partial { tree, verdicts, open, merit: 0.0 }];

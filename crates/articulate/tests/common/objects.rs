@@ -15,7 +15,7 @@ pub fn slide(child: usize, axis: DVec3, values: &[f64]) -> Joint {
 }
 
 pub fn tree(joints: Vec<Joint>) -> KinematicTree {
-    KinematicTree { parts: (0..=joints.len()).map(|i| format!("p{i}")).collect(), joints }
+    KinematicTree { parts: (0..=joints.len()).map(|i| format!("p{i}")).collect(), joints, ..Default::default() }
 }
 
 /// A case from x = `front` to 0.5, open in front; y from -`half` to `half`, z from -0.3 to 0.4.

@@ -1,4 +1,4 @@
-//! A subset of MJCF, enough for sample objects: bodies, one hinge or slide joint each, visual
+//! A subset of MJCF, enough for sample objects, where MuJoCo is not built in: bodies, one hinge or slide joint each, visual
 //! geoms, materials, textures, OBJ meshes, defaults. Planes, and geoms of group 3 and above
 //! (collision by MuJoCo's custom), are not seen.
 //!
@@ -28,13 +28,16 @@ struct Loader<'a, 'i> {
     materials: BTreeMap<String, (Material, [f64; 2])>,
     library: Library,
     object: ArticulatedObject,
+    /// Materials that nobody sees.
+    ghosts: BTreeSet<String>,
     /// Bodies with geometry.
     seen: BTreeSet<String>,
 }
 
 pub(super) fn load(file: &Path, xml: &Document) -> Result<ArticulatedObject, CaptureError> {
     let root = xml.root_element();
-    let compiler = |key: &str| children(root, "compiler").find_map(|c| c.attribute(key));
+    super::mjcf_known::check(&Reader { file }, xml)?;
+    let compiler = |key: &str| children(root, "compiler").filter_map(|c| c.attribute(key)).last();
     let folder = file.parent().unwrap_or(Path::new("."));
     let sub = |key: &str| folder.join(compiler(key).or(compiler("assetdir")).unwrap_or(""));
     let mut loader = Loader {
@@ -53,6 +56,7 @@ pub(super) fn load(file: &Path, xml: &Document) -> Result<ArticulatedObject, Cap
             parts: vec![PartGeometry { links: vec!["world".into()], ..Default::default() }],
             ..Default::default()
         },
+        ghosts: BTreeSet::new(),
         seen: BTreeSet::new(),
     };
     for d in children(root, "default") {
@@ -130,7 +134,10 @@ impl<'a, 'i> Loader<'a, 'i> {
         }
         for m in self.asset("material") {
             let name = self.reader.text(m, "name")?;
-            let [r, g, b, _] = self.numbers::<4>(m, "rgba", "main")?.unwrap_or([1.0; 4]);
+            let [r, g, b, alpha] = self.numbers::<4>(m, "rgba", "main")?.unwrap_or([1.0; 4]);
+            if alpha == 0.0 {
+                self.ghosts.insert(name.clone());
+            }
             let mut material = Material { color: [r as f32, g as f32, b as f32], texture: None };
             if let Some(texture) = self.attribute(m, "texture", "main") {
                 let hint = "add it to <asset>";
@@ -250,7 +257,9 @@ impl<'a, 'i> Loader<'a, 'i> {
         let group = self.numbers::<1>(node, "group", class)?.map_or(0.0, |g| g[0]);
         let kind = self.attribute(node, "type", class).unwrap_or("sphere");
         let kind = if node.attribute("mesh").is_some() { "mesh" } else { kind };
-        if kind == "plane" || group >= 3.0 {
+        let ghost = self.attribute(node, "material", class).is_some_and(|m| self.ghosts.contains(m))
+            || self.numbers::<4>(node, "rgba", class)?.is_some_and(|rgba| rgba[3] == 0.0);
+        if kind == "plane" || group >= 3.0 || ghost {
             return Ok(None);
         }
         let (material, repeat) = self.material(node, class)?;

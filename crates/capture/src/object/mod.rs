@@ -5,7 +5,8 @@
 
 mod mesh_file;
 mod mjcf;
-pub(crate) mod shapes;
+mod mjcf_known;
+pub mod shapes;
 mod text;
 pub(crate) mod texture;
 mod urdf;
@@ -73,7 +74,8 @@ pub struct Material {
 
 impl ArticulatedObject {
     /// Loads a URDF or MJCF file, or a folder with `mobility.urdf`, `object.xml`, or a single such
-    /// file.
+    /// file. Of MJCF a part is understood and the rest refused: `hingecast::objects::load` has
+    /// MuJoCo read it.
     ///
     /// # Errors
     /// When nothing is found, or the description or one of its meshes cannot be read.
@@ -88,12 +90,7 @@ impl ArticulatedObject {
             let hint = "open it in an XML editor at that line, or export it again";
             CaptureError::new(format!("the object file is not XML: {e}"), file.display().to_string(), hint)
         })?;
-        // The loaders walk bodies and classes by recursion.
-        let levels = xml::levels(&xml);
-        if levels > MOST_LEVELS {
-            let what = format!("elements are nested {levels} levels deep, at most {MOST_LEVELS} are read");
-            return Err(CaptureError::new(what, file.display().to_string(), "flatten the tree of bodies"));
-        }
+        flat_enough(&file, &xml)?;
         match xml.root_element().tag_name().name() {
             "robot" => urdf::load(&file, &xml),
             "mujoco" => mjcf::load(&file, &xml),
@@ -103,6 +100,23 @@ impl ArticulatedObject {
                 "point at a URDF or MJCF file",
             )),
         }
+    }
+
+    /// The MJCF file at `path` (a file, or a folder as in [`Self::load`]); `None` if it is anything
+    /// else. Deeply nested files are refused: readers walk them by recursion.
+    ///
+    /// # Errors
+    /// A file that cannot be read or is nested too deeply.
+    pub fn mjcf_at(path: &Path) -> Result<Option<PathBuf>, CaptureError> {
+        let file = if path.is_dir() { description_in(path)? } else { path.to_path_buf() };
+        let bytes = std::fs::read(&file).map_err(|e| CaptureError::read(&file, e))?;
+        let text = String::from_utf8_lossy(&bytes);
+        let Ok(xml) = roxmltree::Document::parse(&text) else { return Ok(None) };
+        if xml.root_element().tag_name().name() != "mujoco" {
+            return Ok(None);
+        }
+        flat_enough(&file, &xml)?;
+        Ok(Some(file))
     }
 
     /// Finds an OBJECT argument: a path, or a bare name in `objects/` (here or in
@@ -131,15 +145,25 @@ impl ArticulatedObject {
         ))
     }
 
-    /// Names the parts, drops doubled faces, checks the whole. A part is called after its first
-    /// link that has a name of its own in `names` or else is `seen` (has geometry); same names get
-    /// numbers.
     fn finish(
         mut self,
         library: mesh_file::Library,
         names: &BTreeMap<String, String>,
         seen: impl Fn(&str) -> bool,
     ) -> Result<Self, String> {
+        (self.materials, self.textures) = (library.materials, library.textures);
+        self.notes.extend(library.notes);
+        self.finished(names, seen)
+    }
+
+    /// The last step of every loader: names the parts, drops doubled faces, checks the whole. A
+    /// part is called after its first link that has a name of its own in `names` or else is `seen`
+    /// (has geometry); same names get numbers.
+    ///
+    /// # Errors
+    /// Too many parts, a tree that is none, a joint that carries nothing to be seen, or nothing to
+    /// be seen at all.
+    pub fn finished(mut self, names: &BTreeMap<String, String>, seen: impl Fn(&str) -> bool) -> Result<Self, String> {
         // Labels are 8-bit and 0 is the background. Asked first: naming takes its time.
         if self.parts.len() > MOST_PARTS {
             let n = self.parts.len();
@@ -159,14 +183,18 @@ impl ArticulatedObject {
             }
             self.tree.parts.push(unique);
         }
-        (self.materials, self.textures, self.notes) = (library.materials, library.textures, library.notes);
         self.tree.validate()?;
         if self.parts.iter().all(|p| p.faces.is_empty()) {
             return Err("the object has no visible surface".into());
         }
-        if let Some(joint) = self.moves_nothing() {
-            let part = &self.tree.parts[joint.child];
-            return Err(format!("the part '{part}', which the joint '{}' moves, has no surface", joint.name));
+        // A part may be nothing but a link between two joints.
+        let bare = |j: usize| {
+            let on_it = |p: usize| self.tree.ancestry(p).contains(&j);
+            (0..self.parts.len()).all(|p| self.parts[p].faces.is_empty() || !on_it(p))
+        };
+        if let Some(j) = (0..self.tree.joints.len()).find(|&j| bare(j)) {
+            let (joint, part) = (&self.tree.joints[j], &self.tree.parts[self.tree.joints[j].child]);
+            return Err(format!("joint '{}' carries '{part}', which has no visible surface", joint.name));
         }
         let far = |v: &Vec3| !(v.abs().max_element() <= mesh_file::FARTHEST);
         if let Some((part, _)) = self.tree.parts.iter().zip(&self.parts).find(|(_, p)| p.vertices.iter().any(far)) {
@@ -175,18 +203,13 @@ impl ArticulatedObject {
         Ok(self)
     }
 
-    /// A joint without a surface on its part and on all that hang on it. A part of its own without
-    /// surface is usual: two joints in a row, the slide and the turn of a lid.
-    fn moves_nothing(&self) -> Option<&hingecast_geom::Joint> {
-        let mut moved: Vec<bool> = self.parts.iter().map(|p| !p.faces.is_empty()).collect();
-        for start in 0..moved.len() {
-            let mut at = start;
-            while let Some(joint) = self.tree.joints.iter().find(|j| moved[at] && j.child == at) {
-                moved[joint.parent] = true;
-                at = joint.parent;
-            }
-        }
-        self.tree.joints.iter().find(|j| !moved[j.child])
+    /// Index of a material, added if it is new.
+    pub fn material(&mut self, material: Material) -> u32 {
+        let known = self.materials.iter().position(|m| *m == material);
+        known.unwrap_or_else(|| {
+            self.materials.push(material);
+            self.materials.len() - 1
+        }) as u32
     }
 
     /// All vertices with the parts at `poses` (world_from_canonical).
@@ -223,6 +246,16 @@ impl ArticulatedObject {
     }
 }
 
+/// The loaders walk bodies and classes by recursion.
+fn flat_enough(file: &Path, xml: &roxmltree::Document) -> Result<(), CaptureError> {
+    let levels = xml::levels(xml);
+    if levels <= MOST_LEVELS {
+        return Ok(());
+    }
+    let what = format!("elements are nested {levels} levels deep, at most {MOST_LEVELS} are read");
+    Err(CaptureError::new(what, file.display().to_string(), "flatten the tree of bodies"))
+}
+
 /// The description file in a folder.
 fn description_in(folder: &Path) -> Result<PathBuf, CaptureError> {
     for name in ["mobility.urdf", "object.xml", "robot.urdf", "robot.xml"] {
@@ -246,7 +279,7 @@ fn description_in(folder: &Path) -> Result<PathBuf, CaptureError> {
 
 impl PartGeometry {
     /// Appends a mesh placed by `canonical_from_mesh`; `scale` acts in the mesh's frame.
-    pub(crate) fn append(&mut self, mesh: &PartGeometry, canonical_from_mesh: &Pose, scale: DVec3) {
+    pub fn append(&mut self, mesh: &PartGeometry, canonical_from_mesh: &Pose, scale: DVec3) {
         let base = self.vertices.len() as u32;
         let place = |v: &Vec3| canonical_from_mesh.apply(v.as_dvec3() * scale).as_vec3();
         self.vertices.extend(mesh.vertices.iter().map(place));

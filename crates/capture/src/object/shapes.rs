@@ -8,7 +8,7 @@ use std::f64::consts::{PI, TAU};
 const AROUND: usize = 64;
 
 /// A box with half extents `half`.
-pub(crate) fn cuboid(half: DVec3, material: u32) -> PartGeometry {
+pub fn cuboid(half: DVec3, material: u32) -> PartGeometry {
     let mut out = PartGeometry::default();
     for axis in 0..3 {
         for sign in [-1.0, 1.0] {
@@ -34,7 +34,7 @@ pub(crate) fn cuboid(half: DVec3, material: u32) -> PartGeometry {
 }
 
 /// An ellipsoid with semi-axes `radii`.
-pub(crate) fn ellipsoid(radii: DVec3, material: u32) -> PartGeometry {
+pub fn ellipsoid(radii: DVec3, material: u32) -> PartGeometry {
     let profile: Vec<[f64; 4]> = arc(-0.5 * PI, 0.5 * PI, AROUND / 2).map(|(c, s)| [c, s, c, s]).collect();
     let mut out = revolve(&profile, material);
     for (v, n) in out.vertices.iter_mut().zip(&mut out.normals) {
@@ -45,7 +45,7 @@ pub(crate) fn ellipsoid(radii: DVec3, material: u32) -> PartGeometry {
 }
 
 /// A closed cylinder along z.
-pub(crate) fn cylinder(radius: f64, half_length: f64, material: u32) -> PartGeometry {
+pub fn cylinder(radius: f64, half_length: f64, material: u32) -> PartGeometry {
     let (r, h) = (radius, half_length);
     let mut out = revolve(&[[0.0, -h, 0.0, -1.0], [r, -h, 0.0, -1.0]], material);
     for profile in [[[r, -h, 1.0, 0.0], [r, h, 1.0, 0.0]], [[r, h, 0.0, 1.0], [0.0, h, 0.0, 1.0]]] {
@@ -55,7 +55,7 @@ pub(crate) fn cylinder(radius: f64, half_length: f64, material: u32) -> PartGeom
 }
 
 /// A cylinder along z of half length `half_length` with half spheres on its ends.
-pub(crate) fn capsule(radius: f64, half_length: f64, material: u32) -> PartGeometry {
+pub fn capsule(radius: f64, half_length: f64, material: u32) -> PartGeometry {
     let cap = |from: f64, to: f64, z: f64| {
         arc(from, to, AROUND / 4).map(move |(c, s)| [radius * c, z + radius * s, c, s]).collect::<Vec<_>>()
     };

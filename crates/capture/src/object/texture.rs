@@ -42,6 +42,16 @@ impl Texture {
         Self::with_mips(Level { width, height, texels: texels.collect() })
     }
 
+    /// From 8-bit sRGB pixels, rows from the top.
+    ///
+    /// # Panics
+    /// When there are not `3 * width * height` of them, or none.
+    pub fn from_rgb(width: usize, height: usize, rgb: &[u8]) -> Self {
+        assert!(width * height > 0 && rgb.len() == 3 * width * height, "{width} x {height}: {} bytes", rgb.len());
+        let linear = |p: &[u8; 3]| Vec3::from_array(p.map(|c| linear_from_srgb(f32::from(c) / 255.0)));
+        Self::with_mips(Level { width, height, texels: rgb.as_chunks().0.iter().map(linear).collect() })
+    }
+
     fn with_mips(base: Level) -> Self {
         let mut levels = vec![base];
         while let Some(last) = levels.last().filter(|l| l.width > 1 || l.height > 1) {

@@ -6,6 +6,7 @@
 
 mod cameras;
 mod config;
+mod coupled;
 mod noise;
 mod occluder;
 mod output;
@@ -65,7 +66,7 @@ pub fn synth(
     }
 
     let ranges = plan::ranges(object, config)?;
-    let states = plan::joint_values(config, &ranges);
+    let states = plan::joint_values(object, config, &ranges);
     let shots = plan::shots(object, config, &states);
     let metres_per_unit = if object.metric { 1.0 } else { ASSUMED_DIAGONAL_METRES / object.diagonal().max(1e-9) };
     let studio = Studio {

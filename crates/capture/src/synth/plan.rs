@@ -1,7 +1,7 @@
 //! Which joint values and which cameras a recording has.
 
 use super::ranges::{UsefulRange, useful_ranges};
-use super::{SynthConfig, cameras, play};
+use super::{SynthConfig, cameras, coupled, play};
 use crate::object::ArticulatedObject;
 use crate::{CaptureError, Split};
 use glam::DVec3;
@@ -28,17 +28,25 @@ pub(super) fn ranges(object: &ArticulatedObject, config: &SynthConfig) -> Result
             hint,
         ));
     }
+    for c in &object.tree.couplings {
+        let (follower, leader) = (names[c.follower], names[c.leader]);
+        if config.ranges.contains_key(follower) {
+            let what = format!("joint '{follower}' follows '{leader}'");
+            return Err(CaptureError::new(what, format!("--range {follower}"), format!("--range {leader}=FROM:TO")));
+        }
+    }
     let mut useful = useful_ranges(object);
     for (name, range) in names.iter().zip(&mut useful) {
         if let Some(&[lower, upper]) = config.ranges.get(*name) {
             *range = UsefulRange { lower, upper, ..*range };
         }
     }
+    coupled::follow(object, &mut useful);
     Ok(useful)
 }
 
 /// Joint values of the recorded states, then of the held-out ones between them.
-pub(super) fn joint_values(config: &SynthConfig, ranges: &[UsefulRange]) -> Vec<Vec<f64>> {
+pub(super) fn joint_values(object: &ArticulatedObject, config: &SynthConfig, ranges: &[UsefulRange]) -> Vec<Vec<f64>> {
     let mut rng = fastrand::Rng::with_seed(config.seed ^ 0x706c_6179);
     let behind: Vec<bool> = ranges.iter().map(|r| r.behind).collect();
     let play = play::Play::new(&behind, config.states == 2, &mut rng);
@@ -48,7 +56,12 @@ pub(super) fn joint_values(config: &SynthConfig, ranges: &[UsefulRange]) -> Vec<
     let between = (0..held_out).map(|k| (last * (k + 1) as f64 / (held_out + 1) as f64).floor() + 0.5);
     let times = (0..config.states).map(|s| s as f64).chain(between).map(|s| s / last);
     let value = |(f, r): (f64, &UsefulRange)| r.lower + f * (r.upper - r.lower);
-    times.map(|t| play.fractions(t).into_iter().zip(ranges).map(value).collect()).collect()
+    let at = |t: f64| {
+        let mut q: Vec<f64> = play.fractions(t).into_iter().zip(ranges).map(value).collect();
+        object.tree.follow(&mut q);
+        q
+    };
+    times.map(at).collect()
 }
 
 /// All views: per state the training cameras, then the held-out ones.

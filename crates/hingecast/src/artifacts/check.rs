@@ -109,7 +109,7 @@ mod tests {
             limits: [0.0, 1.0],
         };
         let parts = ["foot", "arm", "shade"].map(String::from).to_vec();
-        KinematicTree { parts, joints: vec![joint("elbow", 0, 1), joint("neck", 1, 2)] }
+        KinematicTree { parts, joints: vec![joint("elbow", 0, 1), joint("neck", 1, 2)], ..Default::default() }
     }
 
     #[test]

@@ -3,7 +3,7 @@
 use crate::CaptureError;
 use crate::object::xml::{Reader, children};
 use glam::{DMat3, DQuat, DVec3};
-use hingecast_geom::{JointKind, Pose};
+use hingecast_geom::{Coupling, JointKind, KinematicTree, Pose};
 use roxmltree::Node;
 use std::collections::BTreeMap;
 
@@ -124,17 +124,31 @@ impl Reader<'_> {
     }
 }
 
-/// What of a joint is not as one would expect, as sentences.
-pub(super) fn notes(joint: &UrdfJoint) -> Vec<String> {
-    let mut out = Vec::new();
-    let name = &joint.name;
-    if matches!(joint.kind, JointKind::Revolute | JointKind::Prismatic) && joint.limits[0] == joint.limits[1] {
-        out.push(format!("joint {name} does not move: its limits are {0} .. {0}", joint.limits[0]));
+/// What of a joint is not as one would expect, as a sentence.
+pub(super) fn note(joint: &UrdfJoint) -> Option<String> {
+    let still = matches!(joint.kind, JointKind::Revolute | JointKind::Prismatic) && joint.limits[0] == joint.limits[1];
+    still.then(|| format!("joint '{}' does not move: its limits are {1} .. {1}", joint.name, joint.limits[0]))
+}
+
+/// Hands followers on to the tree; sentences of those whose leader does not move.
+pub(super) fn couple(joints: &[UrdfJoint], tree: &mut KinematicTree) -> Vec<String> {
+    let mut notes = Vec::new();
+    let id = |tree: &KinematicTree, name: &str| tree.joints.iter().position(|j| j.name == name);
+    for joint in joints {
+        let (Some((leader, multiplier, offset)), Some(follower)) = (&joint.follows, id(tree, &joint.name)) else {
+            continue;
+        };
+        match id(tree, leader) {
+            Some(leader) => {
+                let polynomial = [*offset, *multiplier, 0.0, 0.0, 0.0];
+                tree.couplings.push(Coupling { follower, leader, polynomial });
+            }
+            // As yourdfpy: a leader that does not move stands at 0.
+            None => {
+                tree.joints[follower].limits = [*offset; 2];
+                notes.push(format!("joint '{}' stays at {offset}: it follows '{leader}', which is fixed", joint.name));
+            }
+        }
     }
-    if let Some((leader, m, o)) = &joint.follows {
-        out.push(format!(
-            "joint {name} follows joint {leader}: {name} = {m} * {leader} + {o}; here it moves by itself"
-        ));
-    }
-    out
+    notes
 }

@@ -73,7 +73,7 @@ pub(super) fn load(file: &Path, xml: &Document) -> Result<ArticulatedObject, Cap
     let partnet = partnet::is_partnet(folder);
     if partnet {
         for joint in partnet::idle_joints(&links, &joints, &places).difference(&minor.clone()) {
-            library.note(format!("joint {joint} stays at 0: what it moves has no surface"));
+            library.note(format!("joint '{joint}' stays at 0: what it moves has no surface"));
             minor.insert(joint.clone());
         }
     }
@@ -112,8 +112,7 @@ pub(super) fn load(file: &Path, xml: &Document) -> Result<ArticulatedObject, Cap
             } else {
                 object.parts.push(PartGeometry::default());
                 let child = object.parts.len() - 1;
-                joint::notes(j).into_iter().for_each(|sentence| library.note(sentence));
-                // `j.follows` goes into the tree here, once joints of the tree may follow others.
+                joint::note(j).into_iter().for_each(|sentence| library.note(sentence));
                 let screw =
                     Screw { kind: j.kind, axis: world_from_joint.rotate(j.axis), pivot: world_from_joint.trans };
                 let joint =
@@ -127,6 +126,8 @@ pub(super) fn load(file: &Path, xml: &Document) -> Result<ArticulatedObject, Cap
     if placed.len() < links.len() {
         return Err(reader.error("some links hang in a cycle of joints", "let every link be the child of one joint"));
     }
+
+    joint::couple(&joints, &mut object.tree).into_iter().for_each(|sentence| library.note(sentence));
 
     let materials = reader.materials(robot)?;
     let (may_lack_meshes, missing) = (partnet, Vec::new());
