@@ -14,7 +14,7 @@ use crate::CaptureError;
 use crate::object::xml::{self, Reader, children};
 use crate::object::{MOST_LEVELS, PartGeometry, text};
 use glam::{DMat4, DVec3, Vec2, Vec3};
-use roxmltree::{Document, Node};
+use roxmltree::{Document, Node, NodeId};
 use std::collections::HashMap;
 use std::path::Path;
 
@@ -29,7 +29,7 @@ struct Loader<'a, 'i> {
     reader: Reader<'a>,
     by_id: HashMap<&'a str, Node<'a, 'i>>,
     looks: Looks<'a, 'i>,
-    sources: HashMap<&'a str, Source>,
+    sources: HashMap<NodeId, Source>,
     library: &'a mut Library,
     default: u32,
     nodes: usize,
@@ -109,6 +109,14 @@ impl<'a, 'i> Loader<'a, 'i> {
         self.by_id.get(node.attribute(key)?.trim_start_matches('#')).copied()
     }
 
+    /// The same, first among the children of `near`: trimesh gives the sources of all geometries
+    /// the same ids.
+    fn target_near(&self, near: Option<Node<'a, 'i>>, node: Node<'a, 'i>, key: &str) -> Option<Node<'a, 'i>> {
+        let id = node.attribute(key)?.trim_start_matches('#');
+        let here = near.and_then(|n| n.children().find(|c| c.attribute("id") == Some(id)));
+        here.or_else(|| self.target(node, key))
+    }
+
     fn node(&mut self, node: Node<'a, 'i>, world_from_parent: DMat4, depth: usize) -> Result<(), CaptureError> {
         self.nodes += 1;
         if self.nodes > MOST_NODES || depth > MOST_LEVELS {
@@ -173,11 +181,12 @@ impl<'a, 'i> Loader<'a, 'i> {
     fn primitives(&mut self, node: Node<'a, 'i>, kind: &str, material: u32, world: DMat4) -> Result<(), CaptureError> {
         let [mut position, mut normal, mut uv] = [None; 3];
         let mut stride = 1;
+        let mesh = node.parent();
         for input in children(node, "input") {
             let offset: usize = input.attribute("offset").and_then(|o| o.trim().parse().ok()).unwrap_or(0);
             stride = stride.max(offset.saturating_add(1));
             let semantic = input.attribute("semantic");
-            let vertices = self.target(input, "source").filter(|_| semantic == Some("VERTEX"));
+            let vertices = self.target_near(mesh, input, "source").filter(|_| semantic == Some("VERTEX"));
             let own = [input].into_iter().filter(|_| vertices.is_none());
             for i in vertices.into_iter().flat_map(|v| children(v, "input")).chain(own) {
                 let slot = match i.attribute("semantic") {
@@ -188,7 +197,7 @@ impl<'a, 'i> Loader<'a, 'i> {
                 };
                 // The first set of texture coordinates is that of the colours.
                 if slot.is_none() {
-                    *slot = Some((self.source(i)?, offset));
+                    *slot = Some((self.source(mesh, i)?, offset));
                 }
             }
         }
@@ -203,16 +212,16 @@ impl<'a, 'i> Loader<'a, 'i> {
         for polygon in polygons {
             let mut corners = Vec::with_capacity(polygon.len());
             for corner in polygon {
-                let index = |of: Option<(&'a str, usize)>| Some((of?.0, indices[corner * stride + of?.1]));
+                let index = |of: Option<(NodeId, usize)>| Some((of?.0, indices[corner * stride + of?.1]));
                 let [at, n, st] = [position, normal, uv].map(index);
                 let key = [at, n, st].map(|of| of.map_or(usize::MAX, |(_, i)| i));
-                let Some(x) = at.and_then(|(id, i)| self.sources[id].row::<3>(i)) else {
+                let Some(x) = at.and_then(|(id, i)| self.sources[&id].row::<3>(i)) else {
                     return Err(self.reader.at(node, format!("there is no vertex {}", key[0]), hint));
                 };
                 let x = world.transform_point3(Vec3::from(x).as_dvec3()).as_vec3();
-                let n = n.and_then(|(id, i)| self.sources[id].row::<3>(i)).map_or(Vec3::ZERO, Vec3::from);
+                let n = n.and_then(|(id, i)| self.sources[&id].row::<3>(i)).map_or(Vec3::ZERO, Vec3::from);
                 let n = normal_matrix.transform_vector3(n.as_dvec3()).as_vec3().normalize_or_zero();
-                let st = st.and_then(|(id, i)| self.sources[id].row::<2>(i)).map_or(Vec2::ZERO, Vec2::from);
+                let st = st.and_then(|(id, i)| self.sources[&id].row::<2>(i)).map_or(Vec2::ZERO, Vec2::from);
                 corners.push(self.out.corner((self.sets, key), x, n, st));
             }
             for k in 2..corners.len() {
@@ -223,17 +232,19 @@ impl<'a, 'i> Loader<'a, 'i> {
         Ok(())
     }
 
-    /// Reads the source of an `<input>`, once; returns its id.
-    fn source(&mut self, input: Node<'a, 'i>) -> Result<&'a str, CaptureError> {
+    /// Reads the source of an `<input>`, once; returns its key.
+    fn source(&mut self, mesh: Option<Node<'a, 'i>>, input: Node<'a, 'i>) -> Result<NodeId, CaptureError> {
         let hint = "export the mesh again";
-        let source = self.target(input, "source");
+        let source = self.target_near(mesh, input, "source");
         let source = source.ok_or_else(|| self.reader.at(input, "the source is not in the file", hint))?;
-        let id = source.attribute("id").expect("it was found by its id");
-        if self.sources.contains_key(id) {
+        let id = source.id();
+        if self.sources.contains_key(&id) {
             return Ok(id);
         }
         let accessor = children(source, "technique_common").flat_map(|t| children(t, "accessor")).next();
-        let array = accessor.and_then(|a| self.target(a, "source")).or_else(|| children(source, "float_array").next());
+        let array = accessor
+            .and_then(|a| self.target_near(Some(source), a, "source"))
+            .or_else(|| children(source, "float_array").next());
         let array = array.ok_or_else(|| self.reader.at(source, "there are no numbers", hint))?;
         let numbers = numbers(array).ok_or_else(|| self.reader.at(array, "this should be numbers", hint))?;
         let value = |key: &str| accessor.and_then(|a| a.attribute(key)).and_then(|v| v.trim().parse().ok());

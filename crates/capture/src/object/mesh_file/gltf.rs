@@ -33,8 +33,8 @@ pub(super) fn load(library: &mut Library, path: &Path, bytes: &[u8], default: u3
     Ok(loader.out)
 }
 
-/// Parses and checks. Some things are seen to before the library's checks: they panic at an index of
-/// positions that points nowhere, and refuse positions without their bounds, which nobody needs.
+/// Parses and checks. Before the library's checks some things are seen to: they panic at positions
+/// that point nowhere, and refuse positions without their bounds, which nobody needs.
 fn open(bytes: &[u8]) -> Result<(Document, Option<Vec<u8>>), String> {
     let gltf::Gltf { document, blob } = gltf::Gltf::from_slice_without_validation(bytes).map_err(|e| e.to_string())?;
     let mut json = document.into_json();

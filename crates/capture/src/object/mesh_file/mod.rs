@@ -21,8 +21,8 @@ use std::path::{Path, PathBuf};
 pub(super) const FARTHEST: f32 = 1e6;
 /// Colour of what has none.
 pub(super) const GREY: [f32; 3] = [0.7; 3];
-const NOT_READ: &str = "OBJ, STL, COLLADA (.dae) and glTF (.gltf, .glb) are read: convert it, for instance with Blender \
-     (open, then File > Export) or `assimp export IN OUT.obj`";
+const NOT_READ: &str = "OBJ, STL, COLLADA (.dae) and glTF (.gltf, .glb) are read: convert it, for instance with \
+     Blender (File > Export) or `assimp export IN OUT.obj`";
 
 /// Materials and textures met so far; a texture file is read once.
 #[derive(Default)]

@@ -241,6 +241,14 @@ fn collada_is_placed_in_metres_and_not_turned() {
         "<instance_node url='#again'/><instance_node url='#again'/></node></library_nodes>",
     );
     assert!(b.refused("circle.dae", circle).contains("nodes hold themselves"));
+    // Another geometry with the same ids for its sources.
+    let (before, rest) =
+        collada().split_once("<geometry id='g'>").map(|(a, b)| (a.to_string(), b.to_string())).unwrap();
+    let (geometry, after) = rest.split_once("</geometry>").unwrap();
+    let other = geometry.replace("0 0 0 200 0 0 200 300 0\n0 300 0", "1 1 1 1 1 1 1 1 1 1 1 1");
+    let twice = format!("{before}<geometry id='g'>{geometry}</geometry><geometry id='h'>{other}</geometry>{after}");
+    let same = b.load("twice.dae", twice).unwrap();
+    assert_eq!(same.vertices, mesh.vertices);
     let none = collada().replace("0 0 1 0 2 0</p>", "0 0 1 0 9 0</p>");
     assert!(b.refused("far.dae", none).contains("no vertex 9"));
     assert!(b.refused("text.dae", "<COLLADA").contains("COLLADA"));
