@@ -49,3 +49,40 @@ usemtl wood\nf 1/1/1 2/2/1 3/3/1\nf 1//1 3//1 4//1\nf -4 -3 -2 -1\ng other\nusem
 
 pub const MTL: &str =
     "newmtl wood\nKa 0 0 0\nKd 0.5 0.3 0.1\nNs 10\nd 1.0\nillum 2\nmap_Kd color.png\nnewmtl plain\nKd 1 1 1\n";
+
+/// A link for each kind of mesh that is not OBJ.
+pub const MESHES: &str = r#"<robot name="meshes">
+  <link name="a"><visual><geometry><mesh filename="a.stl"/></geometry></visual>
+    <visual><geometry><mesh filename="a.dae"/></geometry></visual>
+    <visual><geometry><mesh filename="a.gltf"/></geometry></visual></link>
+</robot>
+"#;
+
+pub const STL: &str = "solid a\nfacet normal 0 0 1\nouter loop\nvertex 0 0 0\nvertex 1 0 0\nvertex 0 1 0\nendloop\n\
+endfacet\nendsolid a\n";
+
+pub const DAE: &str = r##"<?xml version="1.0" encoding="utf-8"?>
+<COLLADA version="1.4.1"><asset><unit meter="0.01"/><up_axis>Z_UP</up_axis></asset>
+<library_effects><effect id="fx"><profile_COMMON><technique sid="c"><lambert><diffuse><color>1 0 0 1</color></diffuse>
+</lambert></technique></profile_COMMON></effect></library_effects>
+<library_materials><material id="m"><instance_effect url="#fx"/></material></library_materials>
+<library_geometries><geometry id="g"><mesh><source id="p"><float_array id="pa" count="9">0 0 0 1 0 0 0 1 0</float_array>
+<technique_common><accessor source="#pa" count="3" stride="3"/></technique_common></source>
+<vertices id="v"><input semantic="POSITION" source="#p"/></vertices><polylist material="m" count="1">
+<input semantic="VERTEX" source="#v" offset="0"/><vcount>3</vcount><p>0 1 2</p></polylist></mesh></geometry></library_geometries>
+<library_nodes><node id="n"><instance_geometry url="#g"/></node></library_nodes>
+<library_visual_scenes><visual_scene id="s"><node><rotate>0 0 1 90</rotate><node><translate>1 2 3</translate>
+<instance_geometry url="#g"/><instance_node url="#n"/></node></node></visual_scene></library_visual_scenes>
+<scene><instance_visual_scene url="#s"/></scene></COLLADA>
+"##;
+
+pub const GLTF: &str = r#"{"asset":{"version":"2.0"},"scene":0,"scenes":[{"nodes":[0]}],
+"nodes":[{"translation":[0,0,1],"children":[1]},{"mesh":0,"scale":[2,1,1]}],
+"meshes":[{"primitives":[{"attributes":{"POSITION":0},"indices":1,"material":0}]}],
+"materials":[{"pbrMetallicRoughness":{"baseColorFactor":[1,0.5,0,1],"baseColorTexture":{"index":0}}}],
+"textures":[{"source":0}],"images":[{"uri":"color.png"}],
+"buffers":[{"byteLength":44,"uri":"data:application/octet-stream;base64,AAAAAAAAAAAAAAAAAACAPwAAAAAAAAAAAAAAAAAAgD8AAAAAAAABAAIAAAA="}],
+"bufferViews":[{"buffer":0,"byteLength":36},{"buffer":0,"byteOffset":36,"byteLength":6}],
+"accessors":[{"bufferView":0,"componentType":5126,"count":3,"type":"VEC3"},
+{"bufferView":1,"componentType":5123,"count":3,"type":"SCALAR"}]}
+"#;

@@ -1,6 +1,6 @@
 //! The readers: of each a small valid folder, the files in it that get damaged, and the reading.
 
-use crate::samples::{MJCF, MTL, OBJ, URDF};
+use crate::samples::{DAE, GLTF, MESHES, MJCF, MTL, OBJ, STL, URDF};
 use glam::{DVec3, Vec3};
 use hingecast::artifacts::{Extent, Groups, Joints, Parts, Placed, Splats, TwinFile, samples, tracks};
 use hingecast::stage::RunFolder;
@@ -35,6 +35,7 @@ pub const TARGETS: &[Target] = &[
     Target { name: "npy", make: npy, damage: &["a.npy"], read: read_npy },
     Target { name: "depth_png", make: pictures, damage: &["depth.png", "color.png"], read: read_pictures },
     Target { name: "obj", make: object, damage: &["lid.obj", "lid.mtl"], read: read_urdf },
+    Target { name: "meshes", make: meshes, damage: &["a.stl", "a.dae", "a.gltf"], read: read_urdf },
     Target { name: "urdf", make: object, damage: &["robot.urdf"], read: read_urdf },
     Target { name: "mjcf", make: object, damage: &["object.xml"], read: read_mjcf },
     Target { name: "recording", make: recording, damage: &["transforms.json"], read: read_recording },
@@ -201,6 +202,13 @@ fn read_import(at: &Path) -> Result<(), String> {
 fn object(at: &Path) {
     pictures(at);
     for (name, content) in [("robot.urdf", URDF), ("object.xml", MJCF), ("lid.obj", OBJ), ("lid.mtl", MTL)] {
+        write(at.join(name), content).unwrap();
+    }
+}
+
+fn meshes(at: &Path) {
+    pictures(at);
+    for (name, content) in [("robot.urdf", MESHES), ("a.stl", STL), ("a.dae", DAE), ("a.gltf", GLTF)] {
         write(at.join(name), content).unwrap();
     }
 }

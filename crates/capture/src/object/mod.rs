@@ -7,6 +7,7 @@ mod mesh_file;
 mod mjcf;
 mod mjcf_known;
 pub mod shapes;
+mod text;
 pub(crate) mod texture;
 mod urdf;
 mod xml;
@@ -41,7 +42,7 @@ pub struct ArticulatedObject {
     pub materials: Vec<Material>,
     /// What the materials refer to.
     pub textures: Vec<Texture>,
-    /// What the loader left out or assumed, a sentence each.
+    /// What was left out or assumed when it was loaded, one sentence each.
     pub notes: Vec<String>,
 }
 
@@ -80,8 +81,12 @@ impl ArticulatedObject {
     /// When nothing is found, or the description or one of its meshes cannot be read.
     pub fn load(path: &Path) -> Result<Self, CaptureError> {
         let file = if path.is_dir() { description_in(path)? } else { path.to_path_buf() };
-        let text = std::fs::read_to_string(&file).map_err(|e| CaptureError::read(&file, e))?;
+        let text = text::read(&file)?;
         let xml = roxmltree::Document::parse(&text).map_err(|e| {
+            // Without its namespace, xacro is not even XML.
+            if matches!(&e, roxmltree::Error::UnknownNamespace(prefix, _) if prefix == "xacro") {
+                return urdf::not_expanded(&file);
+            }
             let hint = "open it in an XML editor at that line, or export it again";
             CaptureError::new(format!("the object file is not XML: {e}"), file.display().to_string(), hint)
         })?;
@@ -147,6 +152,7 @@ impl ArticulatedObject {
         seen: impl Fn(&str) -> bool,
     ) -> Result<Self, String> {
         (self.materials, self.textures) = (library.materials, library.textures);
+        self.notes.extend(library.notes);
         self.finished(names, seen)
     }
 
@@ -189,6 +195,10 @@ impl ArticulatedObject {
         if let Some(j) = (0..self.tree.joints.len()).find(|&j| bare(j)) {
             let (joint, part) = (&self.tree.joints[j], &self.tree.parts[self.tree.joints[j].child]);
             return Err(format!("joint '{}' carries '{part}', which has no visible surface", joint.name));
+        }
+        let far = |v: &Vec3| !(v.abs().max_element() <= mesh_file::FARTHEST);
+        if let Some((part, _)) = self.tree.parts.iter().zip(&self.parts).find(|(_, p)| p.vertices.iter().any(far)) {
+            return Err(format!("the part '{part}' reaches farther than {:e}", mesh_file::FARTHEST));
         }
         Ok(self)
     }
@@ -283,7 +293,7 @@ impl PartGeometry {
     /// Keeps one of several faces over the same three corners. PartNet stores each face twice with
     /// opposite winding, and two coincident colours would flicker.
     pub(crate) fn drop_duplicate_faces(&mut self) {
-        let key = |v: Vec3| (v * 1e5).round().as_ivec3().to_array();
+        let key = |v: Vec3| (v * 1e5).round().as_i64vec3().to_array();
         let mut seen = std::collections::HashSet::new();
         let keep: Vec<bool> = self
             .faces

@@ -23,13 +23,23 @@ impl Texture {
     /// # Errors
     /// When the file is missing or cannot be decoded.
     pub fn read(path: &Path) -> Result<Self, CaptureError> {
-        let image = images::read(path)?.into_rgba8();
+        Ok(Self::of(images::read(path)?))
+    }
+
+    /// Decodes a PNG or JPEG file held in memory; the reason, when it is neither.
+    pub(super) fn decode(bytes: &[u8]) -> Result<Self, String> {
+        let image = image::load_from_memory(bytes);
+        image.map(Self::of).map_err(|e| format!("cannot be decoded (PNG and JPEG are read; {e})"))
+    }
+
+    fn of(image: image::DynamicImage) -> Self {
+        let image = image.into_rgba8();
         let (width, height) = (image.width() as usize, image.height() as usize);
         let texels = image.pixels().map(|p| {
             let a = f32::from(p.0[3]) / 255.0;
             Vec3::from_array([0, 1, 2].map(|c| linear_from_srgb(f32::from(p.0[c]) / 255.0))) * a + Vec3::splat(1.0 - a)
         });
-        Ok(Self::with_mips(Level { width, height, texels: texels.collect() }))
+        Self::with_mips(Level { width, height, texels: texels.collect() })
     }
 
     /// From 8-bit sRGB pixels, rows from the top.
