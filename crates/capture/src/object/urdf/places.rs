@@ -2,6 +2,8 @@
 //! backslashes.
 
 use crate::object::mesh_file::unescaped;
+use std::cell::RefCell;
+use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 /// How deep packages are looked for below a folder of `ROS_PACKAGE_PATH`: workspace, repository,
@@ -14,6 +16,8 @@ pub(super) struct Places {
     folder: PathBuf,
     /// Folders that hold packages, or are one.
     roots: Vec<PathBuf>,
+    /// Folders of the packages that were asked for: a search may read many folders.
+    known: RefCell<BTreeMap<String, Vec<PathBuf>>>,
 }
 
 impl Places {
@@ -24,7 +28,7 @@ impl Places {
         };
         let mut roots = list("ROS_PACKAGE_PATH");
         roots.extend(list("AMENT_PREFIX_PATH").into_iter().map(|p| p.join("share")));
-        Self { folder: file.parent().unwrap_or(Path::new(".")).to_path_buf(), roots }
+        Self { folder: file.parent().unwrap_or(Path::new(".")).to_path_buf(), roots, known: RefCell::default() }
     }
 
     /// The file that `name` stands for; when it is nowhere, the likeliest path.
@@ -51,9 +55,11 @@ impl Places {
 
     /// Folders of the package, the nearest above the URDF first.
     fn package(&self, name: &str) -> Vec<PathBuf> {
-        let mut out: Vec<PathBuf> = self.above().into_iter().filter(|p| is_package(p, name)).collect();
-        out.extend(self.roots.iter().filter_map(|root| below(root, name, 0)));
-        out
+        let search = || {
+            let above = self.above().into_iter().filter(|p| is_package(p, name));
+            above.chain(self.roots.iter().filter_map(|root| below(root, name, 0))).collect()
+        };
+        self.known.borrow_mut().entry(name.to_string()).or_insert_with(search).clone()
     }
 
     fn above(&self) -> Vec<PathBuf> {
@@ -113,7 +119,7 @@ mod tests {
         std::fs::write(ws.join("src/repo/gripper/package.xml"), "<package><name>hand</name></package>").unwrap();
         touch(&ws.join("install/share/base/b.stl"));
         let roots = vec![ws.join("nowhere"), ws.join("src"), ws.join("install/share")];
-        let places = Places { folder: own.join("urdf"), roots };
+        let places = Places { folder: own.join("urdf"), roots, known: RefCell::default() };
         for (name, file) in [
             ("package://arm/meshes/a b.stl", own.join("meshes/a b.stl")),
             ("package://arm/meshes/a%20b.stl", own.join("meshes/a b.stl")),
