@@ -44,9 +44,10 @@ def share_of_equal_pixels(model, recording, mujoco, np):
 
     truth = json.loads(pathlib.Path(str(recording) + ".truth", "truth.json").read_text())
     frames = json.loads((recording / "transforms.json").read_text())
-    # What synth leaves out by rule: planes are floor and wall.
+    # What synth leaves out by rule: planes are floor and wall; and what the viewer does not draw, as its
+    # own rgba has alpha 0, though rays stop at it for its material's sake.
     for geom in range(model.ngeom):
-        if model.geom_type[geom] == mujoco.mjtGeom.mjGEOM_PLANE:
+        if model.geom_type[geom] == mujoco.mjtGeom.mjGEOM_PLANE or model.geom_rgba[geom, 3] == 0:
             model.geom_matid[geom], model.geom_rgba[geom, 3] = -1, 0
     data = mujoco.MjData(model)
     groups = np.array([1, 1, 1, 0, 0, 0], np.uint8)

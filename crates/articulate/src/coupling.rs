@@ -97,9 +97,7 @@ impl Pair<'_> {
     fn distinct(&self, leader_tol: f64, follower_tol: f64) -> usize {
         let mut kept: Vec<(f64, f64)> = Vec::new();
         for (&x, &y) in self.leader.iter().zip(self.follower) {
-            let same = |k: &(f64, f64)| {
-                (k.0 - x).abs() < APART * leader_tol && (k.1 - y).abs() < APART * follower_tol
-            };
+            let same = |k: &(f64, f64)| (k.0 - x).abs() < APART * leader_tol && (k.1 - y).abs() < APART * follower_tol;
             if !kept.iter().any(same) {
                 kept.push((x, y));
             }

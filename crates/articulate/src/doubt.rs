@@ -87,10 +87,10 @@ impl Doubt {
 
     /// The same about a joint that has got another name.
     pub fn renamed(mut self, old: &str, new: &str) -> Self {
-        if let Self::MayFollow { leader, .. } = &mut self {
-            if leader == old {
-                *leader = new.to_string();
-            }
+        if let Self::MayFollow { leader, .. } = &mut self
+            && leader == old
+        {
+            *leader = new.to_string();
         }
         match &mut self {
             Self::Undecidable { joint, .. }

@@ -9,10 +9,11 @@
 use crate::failure::Result;
 use glam::{DVec3, Vec3};
 use hingecast_capture::object::{ArticulatedObject, PartGeometry};
-use hingecast_capture::synth::useful_ranges;
+use hingecast_capture::synth::{UsefulRange, useful_ranges};
 use hingecast_geom::folder::{may_be_emptied, may_become};
 use hingecast_geom::{Progress, TriMesh};
 use hingecast_twin::hulls::{HullConfig, decompose};
+use hingecast_twin::separate::separate;
 use hingecast_twin::{PartModel, Twin, mass};
 use rayon::prelude::*;
 use serde::Serialize;
@@ -83,6 +84,14 @@ pub fn import(source: &Path, out: &Path, config: &ImportConfig, progress: &Progr
         }
     }
     rescale(&mut object, config.scale);
+    let useful: Vec<UsefulRange> = useful
+        .into_iter()
+        .zip(&object.tree.joints)
+        .map(|(range, joint)| {
+            let unit = if joint.screw.kind.turns() { 1.0 } else { config.scale };
+            UsefulRange { lower: range.lower * unit, upper: range.upper * unit, ..range }
+        })
+        .collect();
     if config.scale != 1.0 {
         changes.push(format!("all lengths times {}", config.scale));
     }
@@ -127,7 +136,12 @@ pub fn import(source: &Path, out: &Path, config: &ImportConfig, progress: &Progr
             Ok((PartModel { name: name.clone(), mesh, hulls, inertial }, doubt))
         })
         .collect::<Result<_>>()?;
-    let (parts, doubts): (Vec<PartModel>, Vec<Option<String>>) = parts.into_iter().unzip();
+    let (mut parts, doubts): (Vec<PartModel>, Vec<Option<String>>) = parts.into_iter().unzip();
+    let before: usize = parts.iter().map(|p| p.hulls.len()).sum();
+    let lost = room_to_move(&object, &useful, &mut parts, diagonal);
+    if lost > 0 {
+        changes.push(format!("{lost} of {before} collision pieces stood in the way of other parts and were left out"));
+    }
     changes.extend(doubts.into_iter().flatten());
     for part in parts.iter().filter(|p| p.mesh.is_empty()) {
         changes.push(format!("part '{}' has no surface", part.name));
@@ -161,6 +175,36 @@ pub fn import(source: &Path, out: &Path, config: &ImportConfig, progress: &Progr
         diagonal,
         changes,
     })
+}
+
+/// Configurations of a joint's range at which its parts are kept clear of others.
+const STOPS: usize = 7;
+/// Gap that is left between pieces of different parts, share of the object's diagonal.
+const GAP: f64 = 5e-4;
+
+/// Convex pieces reach beyond what they stand for: cut so that no joint is stopped by a neighbour
+/// that shares no joint with its part, at any of some stops of its way, all others closed (or open,
+/// where only that frees it). Answers how many pieces were lost to that.
+fn room_to_move(object: &ArticulatedObject, useful: &[UsefulRange], parts: &mut [PartModel], diagonal: f64) -> usize {
+    let tree = &object.tree;
+    let ends = |open: bool| useful.iter().map(move |r| if open { r.upper } else { r.lower }).collect::<Vec<f64>>();
+    let mut poses = Vec::new();
+    for (j, range) in useful.iter().enumerate() {
+        for k in 0..STOPS {
+            let mut q = ends(range.behind);
+            q[j] = range.lower + (range.upper - range.lower) * k as f64 / (STOPS - 1) as f64;
+            tree.follow(&mut q);
+            poses.push(tree.poses(&q));
+        }
+    }
+    let mut order: Vec<usize> = (0..parts.len()).collect();
+    order.sort_by_key(|&p| tree.ancestry(p).len());
+    let jointed =
+        |a: usize, b: usize| tree.joints.iter().any(|j| (j.parent, j.child) == (a, b) || (j.parent, j.child) == (b, a));
+    let mut hulls: Vec<Vec<TriMesh>> = parts.iter_mut().map(|p| std::mem::take(&mut p.hulls)).collect();
+    let lost = separate(&mut hulls, &order, &poses, (GAP * diagonal) as f32, |a, b| !jointed(a, b));
+    parts.iter_mut().zip(hulls).for_each(|(part, hulls)| part.hulls = hulls);
+    lost
 }
 
 fn rescale(object: &mut ArticulatedObject, scale: f64) {

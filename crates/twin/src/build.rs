@@ -140,7 +140,7 @@ pub fn build<E: From<Cancelled> + Send>(
     let root_first: Vec<usize> = order.iter().rev().copied().collect();
     let solid = |pieces: &[Vec<TriMesh>]| pieces.iter().flatten().map(|h| h.mass_integrals().volume).sum::<f64>();
     let before = solid(&pieces);
-    let lost = separate::separate(&mut pieces, &root_first, &path, 0.1 * voxel);
+    let lost = separate::separate(&mut pieces, &root_first, &path, 0.1 * voxel, |_, _| true);
     let share = 1.0 - solid(&pieces) / before.max(1e-30);
     if lost > 0 && share > LOST {
         doubts.push(format!(

@@ -3,7 +3,11 @@
 use glam::Vec3;
 use hingecast_geom::TriMesh;
 use parry3d::math::Vector;
+use parry3d::transformation::try_convex_hull;
 use parry3d::transformation::vhacd::{VHACD, VHACDParameters};
+use std::cell::Cell;
+use std::panic::AssertUnwindSafe;
+use std::sync::Once;
 
 /// Resolution 128 and concavity 0.001 keep a drawer with thin walls open; the defaults fill 3 % of
 /// it.
@@ -29,14 +33,21 @@ pub fn decompose(mesh: &TriMesh, config: &HullConfig) -> (Vec<TriMesh>, usize) {
         return (Vec::new(), 0);
     }
     let points: Vec<Vector> = mesh.vertices.iter().map(|v| Vector::new(v.x, v.y, v.z)).collect();
-    let parameters = VHACDParameters {
-        resolution: config.resolution,
-        concavity: config.concavity,
-        max_convex_hulls: config.max_hulls,
-        ..Default::default()
+    // On some surfaces parry's own hulls of voxels fail, and it panics. A slightly other grid of
+    // voxels does then; the hull of the whole always does.
+    let at = |resolution: u32| {
+        let parameters = VHACDParameters {
+            resolution,
+            concavity: config.concavity,
+            max_convex_hulls: config.max_hulls,
+            ..Default::default()
+        };
+        quietly(|| VHACD::decompose(&parameters, &points, &mesh.faces, false).compute_convex_hulls(4))
     };
+    let tries = (0..TRIES).map(|k| config.resolution - k * config.resolution / 16);
+    let whole = || try_convex_hull(&points).into_iter().collect();
+    let mut pieces: Vec<(Vec<Vector>, Vec<[u32; 3]>)> = tries.filter_map(at).next().unwrap_or_else(whole);
     // Pieces without any voxel come back empty.
-    let mut pieces = VHACD::decompose(&parameters, &points, &mesh.faces, false).compute_convex_hulls(4);
     pieces.retain(|(vertices, _)| !vertices.is_empty());
     let total = pieces.len();
     let (lo, hi) = mesh.bounds().unwrap_or_default();
@@ -54,6 +65,27 @@ pub fn decompose(mesh: &TriMesh, config: &HullConfig) -> (Vec<TriMesh>, usize) {
     (hulls, dropped)
 }
 
+/// Grids of voxels that are tried before the part is taken as one piece.
+const TRIES: u32 = 6;
+
+/// What `work` answers, or nothing if it panics, which is then not printed either.
+fn quietly<T>(work: impl FnOnce() -> T) -> Option<T> {
+    thread_local!(static CATCHING: Cell<bool> = const { Cell::new(false) });
+    static HOOK: Once = Once::new();
+    HOOK.call_once(|| {
+        let before = std::panic::take_hook();
+        std::panic::set_hook(Box::new(move |info| {
+            if !CATCHING.get() {
+                before(info);
+            }
+        }));
+    });
+    CATCHING.set(true);
+    let answer = std::panic::catch_unwind(AssertUnwindSafe(work)).ok();
+    CATCHING.set(false);
+    answer
+}
+
 /// A hull that a simulator accepts: finite, closed, with a volume, not a sheet.
 pub fn usable(hull: &TriMesh, thinnest: f32) -> bool {
     if hull.faces.len() < 4 || hull.vertices.iter().any(|v| !v.is_finite()) || hull.open_edges() != 0 {
@@ -67,6 +99,12 @@ pub fn usable(hull: &TriMesh, thinnest: f32) -> bool {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_panic_of_the_decomposition_is_no_panic_of_ours() {
+        assert_eq!(quietly(|| 1), Some(1));
+        assert_eq!(quietly(|| Err::<u8, &str>("no hull").unwrap()), None);
+    }
 
     /// An open-top box out of five slabs, as one mesh.
     fn drawer() -> TriMesh {

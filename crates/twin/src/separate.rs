@@ -48,14 +48,20 @@ fn piece(hull: &TriMesh) -> Option<Piece> {
     Some(Piece { shape: ConvexPolyhedron::from_convex_hull(&points)?, lo, hi, normals })
 }
 
-/// Cuts `hulls[part]` for all parts in `order` (root first) clear of the parts before it, in all
-/// states. `poses[state][part]`: world from canonical; `clearance`: the gap to leave, scene units.
-/// Answers how many pieces were dropped.
-pub fn separate(hulls: &mut [Vec<TriMesh>], order: &[usize], poses: &[Vec<Pose>], clearance: f32) -> usize {
+/// Cuts `hulls[part]` for all parts in `order` (root first) clear of the parts before it that it
+/// `meets`, in all states. `poses[state][part]`: world from canonical; `clearance`: the gap to
+/// leave, scene units. Answers how many pieces were dropped.
+pub fn separate(
+    hulls: &mut [Vec<TriMesh>],
+    order: &[usize],
+    poses: &[Vec<Pose>],
+    clearance: f32,
+    meets: impl Fn(usize, usize) -> bool,
+) -> usize {
     let mut dropped = 0;
     for (k, &part) in order.iter().enumerate() {
         let mut cut = std::mem::take(&mut hulls[part]);
-        for &other in &order[..k] {
+        for &other in order[..k].iter().filter(|&&other| meets(part, other)) {
             let still: Vec<Piece> = hulls[other].iter().filter_map(piece).collect();
             let other_from_part: Vec<Pose> = poses.iter().map(|at| at[other].inverse() * at[part]).collect();
             let results: Vec<Option<TriMesh>> =
@@ -144,7 +150,7 @@ mod tests {
         let lid = TriMesh::cuboid(Vec3::new(0.0, 0.0, 0.95), Vec3::new(1.0, 1.0, 1.15));
         let lost = TriMesh::cuboid(Vec3::splat(0.4), Vec3::splat(0.5));
         let mut hulls = vec![vec![base.clone()], vec![lid, lost]];
-        let dropped = separate(&mut hulls, &[0, 1], &[vec![Pose::IDENTITY; 2]], 1e-4);
+        let dropped = separate(&mut hulls, &[0, 1], &[vec![Pose::IDENTITY; 2]], 1e-4, |_, _| true);
         assert_eq!((dropped, hulls[1].len()), (1, 1));
         assert_eq!(hulls[0][0], base);
         let (lo, hi) = hulls[1][0].bounds().unwrap();

@@ -2,7 +2,6 @@
 //! moved stands where those see past it.
 
 use super::pixels::Look;
-use super::space::points;
 use super::{Finding, warning};
 use crate::Recording;
 use glam::DVec3;
@@ -19,7 +18,7 @@ const NOISE: f64 = 1.5;
 pub(super) fn nothing_moves(recording: &Recording, looks: &[Option<Look>], by_state: &[Vec<usize>]) -> Option<Finding> {
     let n = by_state.len();
     let cloud = |s: usize| -> Vec<(usize, Vec<DVec3>)> {
-        let of = |&i: &usize| Some((i, points(looks[i].as_ref()?, &recording.frames[i].camera, 1.0)));
+        let of = |&i: &usize| Some((i, looks[i].as_ref()?.points(&recording.frames[i].camera, 1.0)));
         by_state[s].iter().filter_map(of).collect()
     };
     let clouds: Vec<_> = (0..n).map(cloud).collect();

@@ -4,8 +4,8 @@
 use super::{Finding, Fix, Severity, address, error, warning};
 use crate::recording::transforms::Document;
 use crate::{CaptureError, Recording, View};
-use glam::DVec2;
-use hingecast_geom::Progress;
+use glam::{DVec2, DVec3};
+use hingecast_geom::{Camera, Progress};
 use rayon::prelude::*;
 use std::collections::BTreeMap;
 use std::sync::atomic::{AtomicUsize, Ordering};
@@ -13,6 +13,8 @@ use xxhash_rust::xxh3::xxh3_128;
 
 /// Width of the thumbnails (of depth and mask) that the check of space works on, pixels at most.
 const THUMBNAIL: usize = 96;
+/// Points of a view that are compared with other views.
+const POINTS: usize = 150;
 
 /// What is kept of a frame's pixels. Thumbnail pixels are samples of the image, not means.
 pub(super) struct Look {
@@ -42,6 +44,14 @@ impl Look {
         let p = (uv / self.step).floor();
         let inside = p.x >= 0.0 && p.y >= 0.0 && p.x < self.width as f64 && p.y < self.height as f64;
         inside.then(|| p.y as usize * self.width + p.x as usize)
+    }
+
+    /// Some of the object's points, in the world, at depth times `scale`.
+    pub fn points(&self, camera: &Camera, scale: f64) -> Vec<DVec3> {
+        let good: Vec<usize> = (0..self.depth.len()).filter(|&i| self.object[i] == 1 && self.depth[i] > 0.0).collect();
+        let n = good.len().min(POINTS);
+        let at = |i: usize| camera.unproject(self.uv(i), f64::from(self.depth[i]) * scale);
+        (0..n).map(|k| at(good[k * good.len() / n])).collect()
     }
 }
 

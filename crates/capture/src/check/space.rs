@@ -11,9 +11,8 @@ use hingecast_geom::Camera;
 /// Factors by which depth units are mistaken: metres, centimetres, millimetres, tenths, RealSense
 /// and TUM units.
 const UNITS: [f64; 10] = [1e-4, 1e-3, 1e-2, 0.1, 0.2, 5.0, 10.0, 100.0, 1e3, 1e4];
-/// Views of a state that are compared with each other, and points of each.
+/// Views of a state that are compared with each other.
 const VIEWS: usize = 8;
-const POINTS: usize = 150;
 /// Share of points that must land on the object in another view when all is well; below the second
 /// all is not.
 const AGREES: f64 = 0.7;
@@ -109,16 +108,6 @@ fn some_views(recording: &Recording, looks: &[Option<Look>], state: usize) -> Ve
     (0..n).map(|k| all[k * all.len() / n]).collect()
 }
 
-/// Object points of a frame in camera axes, at depth times `scale`.
-pub(super) fn points(look: &Look, camera: &Camera, scale: f64) -> Vec<DVec3> {
-    let good: Vec<usize> = (0..look.depth.len()).filter(|&i| look.object[i] == 1 && look.depth[i] > 0.0).collect();
-    let n = good.len().min(POINTS);
-    (0..n)
-        .map(|k| good[k * good.len() / n])
-        .map(|i| camera.unproject(look.uv(i), f64::from(look.depth[i]) * scale))
-        .collect()
-}
-
 /// How points fare in another view: on the object's silhouette; at the depth that is seen there;
 /// all.
 #[derive(Default)]
@@ -149,7 +138,7 @@ fn depth_unit(recording: &Recording, looks: &[Option<Look>], by_state: &[Vec<usi
         // Three states are enough, the unit is one for all.
         for views in by_state.iter().take(3) {
             for &i in views {
-                let from = points(looks[i].as_ref()?, &recording.frames[i].camera, scale);
+                let from = looks[i].as_ref()?.points(&recording.frames[i].camera, scale);
                 for &j in views.iter().filter(|&&j| j != i) {
                     carry(&from, looks[j].as_ref()?, &recording.frames[j].camera, scale, 0.0, &mut fate);
                 }
@@ -188,7 +177,7 @@ fn states_apart(recording: &Recording, looks: &[Option<Look>], by_state: &[Vec<u
     let clouds: Vec<Vec<Vec<DVec3>>> = by_state
         .iter()
         .map(|views| {
-            let of = |&i: &usize| looks[i].as_ref().map(|l| points(l, &recording.frames[i].camera, 1.0));
+            let of = |&i: &usize| looks[i].as_ref().map(|l| l.points(&recording.frames[i].camera, 1.0));
             views.iter().filter_map(of).collect()
         })
         .collect();

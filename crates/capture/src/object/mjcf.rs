@@ -313,7 +313,7 @@ impl<'a, 'i> Loader<'a, 'i> {
             asset.ok_or_else(|| self.reader.at(geom, format!("there is no mesh {name}"), "add it to <asset>"))?;
         let file = self.meshes.join(self.reader.text(asset, "file")?);
         let scale = self.numbers::<3>(asset, "scale", "main")?.map_or(DVec3::ONE, DVec3::from);
-        let loaded = self.library.load_obj(&file, material)?;
+        let loaded = self.library.load(&file, material)?;
         let mut out = PartGeometry::default();
         out.append(&loaded, &Pose::IDENTITY, scale);
         // MuJoCo gives a mesh one material, that of the geom.

@@ -1,12 +1,20 @@
 //! Ranges of joints that follow others: a leader goes no farther than its followers can.
 
-use super::ranges::UsefulRange;
+use super::ranges::{UsefulRange, each_alone};
 use crate::object::ArticulatedObject;
 
 /// Places of a leader's range at which its followers are asked.
 const STEPS: usize = 200;
 /// A follower may leave its limits by this share of their width: files are rounded.
 const ROUNDING: f64 = 1e-3;
+
+/// One range a joint of the tree, other joints at 0, or open if only that frees it. A joint that
+/// follows another has the range in which it follows.
+pub fn useful_ranges(object: &ArticulatedObject) -> Vec<UsefulRange> {
+    let mut ranges = each_alone(object);
+    follow(object, &mut ranges);
+    ranges
+}
 
 /// Narrows the ranges of leaders to where no follower leaves its limits, from the closed end on, and
 /// gives every follower the range in which it follows.

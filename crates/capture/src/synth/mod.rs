@@ -21,7 +21,8 @@ mod staging;
 mod still;
 
 pub use config::{Noise, SynthConfig, SynthReport};
-pub use ranges::{UsefulRange, useful_ranges};
+pub use coupled::useful_ranges;
+pub use ranges::UsefulRange;
 pub(crate) use staging::Staging;
 pub use staging::may_be_replaced;
 

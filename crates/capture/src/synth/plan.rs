@@ -1,7 +1,8 @@
 //! Which joint values and which cameras a recording has.
 
-use super::ranges::{UsefulRange, useful_ranges};
-use super::{SynthConfig, cameras, coupled, play};
+use super::coupled::{self, useful_ranges};
+use super::ranges::UsefulRange;
+use super::{SynthConfig, cameras, play};
 use crate::object::ArticulatedObject;
 use crate::{CaptureError, Split};
 use glam::DVec3;

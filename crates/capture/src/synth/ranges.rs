@@ -9,7 +9,6 @@
 //! A rack behind a door, or a seat below a lid, goes nowhere while all else is closed. What is
 //! stuck like that is asked once more with everything else open.
 
-use super::coupled;
 use super::scene::Scene;
 use crate::object::{ArticulatedObject, PartGeometry};
 use glam::{DVec3, Vec3A};
@@ -42,9 +41,8 @@ const STUCK: f64 = 0.25;
 /// ... and something else is in its way if it goes this many times farther once that is open.
 const FREED: f64 = 2.0;
 
-/// One range a joint of the tree, other joints at 0, or open if only that frees it. A joint that
-/// follows another has the range in which it follows.
-pub fn useful_ranges(object: &ArticulatedObject) -> Vec<UsefulRange> {
+/// One range a joint of the tree, other joints at 0, or open if only that frees it.
+pub(super) fn each_alone(object: &ArticulatedObject) -> Vec<UsefulRange> {
     let joints = &object.tree.joints;
     let closed = vec![0.0; joints.len()];
     let mut ranges: Vec<UsefulRange> = (0..joints.len()).map(|j| useful_range(object, j, &closed)).collect();
@@ -59,7 +57,6 @@ pub fn useful_ranges(object: &ArticulatedObject) -> Vec<UsefulRange> {
             }
         }
     }
-    coupled::follow(object, &mut ranges);
     ranges
 }
 

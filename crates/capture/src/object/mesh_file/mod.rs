@@ -96,11 +96,6 @@ impl Library {
         }
     }
 
-    /// What MJCF files call.
-    pub fn load_obj(&mut self, path: &Path, default: u32) -> Result<PartGeometry, CaptureError> {
-        self.load(path, default)
-    }
-
     /// A mesh file in its own frame. Faces without material get `default`.
     ///
     /// # Errors
