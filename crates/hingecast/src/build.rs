@@ -214,7 +214,8 @@ fn run_stage(
             made.keep_groups(groups.write(at)?);
         }
         (Method::Track, Stage::Joints) => {
-            let joints = classical::joints::run(inputs, made.splats()?, made.groups()?, progress)?;
+            let mut joints = classical::joints::run(inputs, made.splats()?, made.groups()?, progress)?;
+            crate::overrides::apply(&mut joints, &inputs.config.joint, &made.splats()?.extent)?;
             made.keep_joints(joints.write(at)?);
         }
         (method, Stage::Twin) => {

@@ -13,6 +13,7 @@ use hingecast_capture::synth::{UsefulRange, useful_ranges};
 use hingecast_geom::folder::{may_be_emptied, may_become};
 use hingecast_geom::{Progress, TriMesh};
 use hingecast_twin::hulls::{HullConfig, decompose};
+use hingecast_twin::link::touching;
 use hingecast_twin::separate::separate;
 use hingecast_twin::{PartModel, Twin, mass};
 use rayon::prelude::*;
@@ -72,10 +73,20 @@ pub fn import(source: &Path, out: &Path, config: &ImportConfig, progress: &Progr
     let mut changes = std::mem::take(&mut object.notes);
     // The ranges that `synth` plays: files let doors swing through their cabinets.
     let useful = useful_ranges(&object);
-    for (joint, range) in object.tree.joints.iter_mut().zip(&useful) {
+    let mut useful = useful;
+    for (joint, range) in object.tree.joints.iter_mut().zip(&mut useful) {
+        let [from, to] = joint.limits;
+        if (range.upper - range.lower).abs() < STUCK * (to - from) {
+            // A button that sinks into its body, a lid modelled inside its neck.
+            changes.push(format!(
+                "joint '{}' runs into its neighbours' surface at once: the file's {from:.3} .. {to:.3} stay",
+                joint.name
+            ));
+            *range = UsefulRange { lower: from, upper: to, behind: false };
+            continue;
+        }
         let limits = [range.lower.min(range.upper), range.lower.max(range.upper)];
         if limits.iter().zip(joint.limits).any(|(a, b)| (a - b).abs() > 1e-6) {
-            let [from, to] = joint.limits;
             changes.push(format!(
                 "joint '{}' may go {:.3} .. {:.3}, not {from:.3} .. {to:.3}",
                 joint.name, limits[0], limits[1]
@@ -177,21 +188,27 @@ pub fn import(source: &Path, out: &Path, config: &ImportConfig, progress: &Progr
     })
 }
 
+/// A joint that the surfaces leave less than this share of its range is not stopped by them: they
+/// overlap as they are modelled.
+const STUCK: f64 = 0.1;
 /// Configurations of a joint's range at which its parts are kept clear of others.
 const STOPS: usize = 7;
 /// Gap that is left between pieces of different parts, share of the object's diagonal.
 const GAP: f64 = 5e-4;
 
 /// Convex pieces reach beyond what they stand for: cut so that no joint is stopped by a neighbour
-/// that shares no joint with its part, at any of some stops of its way, all others closed (or open,
+/// that shares no joint with its part, at any of some stops of its way, all others at 0 (or open,
 /// where only that frees it). Answers how many pieces were lost to that.
 fn room_to_move(object: &ArticulatedObject, useful: &[UsefulRange], parts: &mut [PartModel], diagonal: f64) -> usize {
     let tree = &object.tree;
-    let ends = |open: bool| useful.iter().map(move |r| if open { r.upper } else { r.lower }).collect::<Vec<f64>>();
+    // As the ranges were found: others at 0, or where their limits come nearest to it.
+    let rest = |j: usize| 0f64.clamp(tree.joints[j].limits[0], tree.joints[j].limits[1]);
+    let others =
+        |open: bool| (0..useful.len()).map(|j| if open { useful[j].upper } else { rest(j) }).collect::<Vec<_>>();
     let mut poses = Vec::new();
     for (j, range) in useful.iter().enumerate() {
         for k in 0..STOPS {
-            let mut q = ends(range.behind);
+            let mut q = others(range.behind);
             q[j] = range.lower + (range.upper - range.lower) * k as f64 / (STOPS - 1) as f64;
             tree.follow(&mut q);
             poses.push(tree.poses(&q));
@@ -199,10 +216,10 @@ fn room_to_move(object: &ArticulatedObject, useful: &[UsefulRange], parts: &mut 
     }
     let mut order: Vec<usize> = (0..parts.len()).collect();
     order.sort_by_key(|&p| tree.ancestry(p).len());
-    let jointed =
-        |a: usize, b: usize| tree.joints.iter().any(|j| (j.parent, j.child) == (a, b) || (j.parent, j.child) == (b, a));
+    let jointed: Vec<[usize; 2]> = touching(tree, |p| parts[p].mesh.is_empty());
+    let meet = |a: usize, b: usize| !jointed.contains(&[a, b]) && !jointed.contains(&[b, a]);
     let mut hulls: Vec<Vec<TriMesh>> = parts.iter_mut().map(|p| std::mem::take(&mut p.hulls)).collect();
-    let lost = separate(&mut hulls, &order, &poses, (GAP * diagonal) as f32, |a, b| !jointed(a, b));
+    let lost = separate(&mut hulls, &order, &poses, (GAP * diagonal) as f32, meet);
     parts.iter_mut().zip(hulls).for_each(|(part, hulls)| part.hulls = hulls);
     lost
 }

@@ -1,7 +1,7 @@
 //! A person's corrections: `[[joint]]` entries of the config overrule what was found; only the
 //! stages from `joints` on run again.
 
-use crate::artifacts::Joints;
+use crate::artifacts::{Extent, Joints};
 use crate::failure::{Failure, Result};
 use glam::DVec3;
 use hingecast_articulate::Doubt;
@@ -37,14 +37,21 @@ pub struct JointOverride {
     pub independent: Option<bool>,
 }
 
-/// Applies the entries in order.
+/// Farthest that a pivot lies from the object or a slide goes, diagonals of it: a nearly straight
+/// way is a turn about something far.
+const FARTHEST: f64 = 20.0;
+/// Most that a hinge turns.
+const MOST_TURNS: f64 = 10.0;
+
+/// Applies the entries in order, to joints of an object of this `size`.
 ///
 /// # Errors
-/// Joints or parts that are not there, axes of no length, limits upside down, a tree that hangs on
-/// itself.
-pub fn apply(file: &mut Joints, entries: &[JointOverride]) -> Result<()> {
+/// Joints or parts that are not there, axes of no length, limits upside down, numbers out of all
+/// proportion, a tree that hangs on itself.
+pub fn apply(file: &mut Joints, entries: &[JointOverride], size: &Extent) -> Result<()> {
     for (k, entry) in entries.iter().enumerate() {
-        one(file, entry).map_err(|(what, hint)| Failure::new(what, format!("[[joint]] number {}", k + 1), hint))?;
+        one(file, entry, size)
+            .map_err(|(what, hint)| Failure::new(what, format!("[[joint]] number {}", k + 1), hint))?;
     }
     file.tree.validate().map_err(|e| Failure::new(e, "[[joint]]", "change 'parent'"))
 }
@@ -60,7 +67,7 @@ pub fn uncouple(file: &mut Joints, entries: &[JointOverride]) {
     }
 }
 
-fn one(file: &mut Joints, entry: &JointOverride) -> std::result::Result<(), (String, String)> {
+fn one(file: &mut Joints, entry: &JointOverride, size: &Extent) -> std::result::Result<(), (String, String)> {
     let names: Vec<&str> = file.tree.joints.iter().map(|j| j.name.as_str()).collect();
     let there = format!("joint = one of: {}", names.join(", "));
     let Some(j) = names.iter().position(|n| *n == entry.joint) else {
@@ -92,6 +99,13 @@ fn one(file: &mut Joints, entry: &JointOverride) -> std::result::Result<(), (Str
         joint.screw.axis = axis.ok_or_else(|| ("an axis without direction".to_string(), hint))?;
     }
     if let Some(pivot) = entry.pivot {
+        let middle = 0.5 * (DVec3::from(size.lo) + DVec3::from(size.hi));
+        let far = DVec3::from(pivot).distance(middle);
+        if !(far <= FARTHEST * size.diagonal) {
+            let hint =
+                format!("pivot = [x, y, z] in scene units, near {middle:.3}; the object is {:.3} large", size.diagonal);
+            return Err((format!("a pivot {far:.3e} from the object"), hint));
+        }
         joint.screw.pivot = DVec3::from(pivot);
     }
     // The part keeps going where it went, as far as the new screw can take it.
@@ -119,6 +133,11 @@ fn one(file: &mut Joints, entry: &JointOverride) -> std::result::Result<(), (Str
         if !(lo <= hi) {
             return Err((format!("limits {lo} .. {hi} are upside down"), "limits = [lower, upper]".to_string()));
         }
+        let most = if joint.screw.kind.turns() { 360.0 * MOST_TURNS } else { FARTHEST * size.diagonal };
+        if !(lo.abs().max(hi.abs()) <= most) {
+            let hint = format!("limits = [lower, upper] within {most:.1}; degrees for hinges, scene units for slides");
+            return Err((format!("limits {lo} .. {hi} are out of all proportion"), hint));
+        }
         let unit = if joint.screw.kind.turns() { 1f64.to_radians() } else { 1.0 };
         joint.limits = [lo * unit, hi * unit];
     }
@@ -127,4 +146,39 @@ fn one(file: &mut Joints, entry: &JointOverride) -> std::result::Result<(), (Str
         joint.name.clone_from(name);
     }
     Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use hingecast_geom::{Joint, KinematicTree, Screw};
+
+    fn door() -> Joints {
+        let screw = Screw { kind: JointKind::Revolute, axis: DVec3::Z, pivot: DVec3::ZERO };
+        let (name, values, limits) = ("joint_1".to_string(), vec![0.0, 1.0], [0.0, 1.0]);
+        let joints = vec![Joint { name, parent: 0, child: 1, screw, values, limits }];
+        let tree = KinematicTree { parts: ["base", "part_1"].map(String::from).to_vec(), joints, ..Default::default() };
+        Joints { tree, labels: Vec::new(), doubts: Vec::new(), certainty: vec![None] }
+    }
+
+    fn refused(entry: JointOverride) -> String {
+        let size = Extent { lo: [0.0; 3], hi: [1.0; 3], diagonal: 1.7 };
+        let entry = JointOverride { joint: "joint_1".into(), ..entry };
+        apply(&mut door(), &[entry], &size).map_err(|e| e.what).err().unwrap_or_default()
+    }
+
+    /// Off by powers of ten, they once took all memory, or all time.
+    #[test]
+    fn numbers_out_of_all_proportion_are_refused() {
+        let pivot = |x: f64| refused(JointOverride { pivot: Some([x, 0.0, 0.0]), ..Default::default() });
+        assert_eq!(pivot(12.0), "");
+        for x in [50.0, 1e6, 1e300, f64::INFINITY, f64::NAN] {
+            assert!(pivot(x).contains("from the object"), "{x}");
+        }
+        let limits = |x: f64| refused(JointOverride { limits: Some([-x, x]), ..Default::default() });
+        assert_eq!(limits(720.0), "");
+        for x in [4000.0, 1e7, 1e308, f64::INFINITY] {
+            assert!(limits(x).contains("proportion"), "{x}");
+        }
+    }
 }

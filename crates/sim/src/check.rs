@@ -8,6 +8,9 @@ use mujoco_rs::prelude::*;
 use serde::{Deserialize, Serialize};
 use std::path::Path;
 
+/// Share of its range that a joint must reach.
+const FREE: f64 = 0.98;
+
 /// How a model is tried.
 #[derive(Clone, Copy, Debug)]
 pub struct CheckConfig {
@@ -36,6 +39,10 @@ pub struct JointSweep {
     pub reached: f64,
     /// Largest distance between wanted and real value, rad or scene units.
     pub worst_lag: f64,
+    /// That far only with the other joints at an end of their ranges: something stands in the way
+    /// otherwise.
+    #[serde(default, skip_serializing_if = "std::ops::Not::not")]
+    pub freed: bool,
 }
 
 /// What MuJoCo made of one file.
@@ -70,7 +77,7 @@ impl FileCheck {
             out.push(format!("{}: parts overlap by {:.4} at rest", self.file, self.rest_penetration));
         }
         for s in &self.sweeps {
-            if !(s.reached >= 0.98) {
+            if !(s.reached >= FREE) {
                 out.push(format!(
                     "{}: joint '{}' reaches only {:.0} % of its range",
                     self.file,
@@ -115,6 +122,7 @@ fn try_model(path: &Path, config: &CheckConfig) -> Result<FileCheck, SimError> {
         warnings: Vec::new(),
     };
     let mut data = MjData::new(&model);
+    within_limits(&model, &mut data);
     data.forward();
     check.rest_penetration = data.contact().iter().map(|c| -c.dist).fold(0.0, f64::max);
 
@@ -127,9 +135,7 @@ fn try_model(path: &Path, config: &CheckConfig) -> Result<FileCheck, SimError> {
     check.finite &= finite(&data);
 
     for joint in 0..model.ffi().njnt as usize {
-        if let Some(sweep) = sweep(&model, joint, config, &mut check.finite) {
-            check.sweeps.push(sweep);
-        }
+        check.sweeps.extend(best_sweep(&model, joint, config, &mut check.finite));
     }
     Ok(check)
 }
@@ -140,9 +146,50 @@ fn finite(data: &MjData<&MjModel>) -> bool {
         && data.warning().iter().all(|w| w.number == 0)
 }
 
-/// Drives one joint from end to end by a stiff servo, all others held where they start, but for
-/// those that follow it. A joint that follows another is not driven.
-fn sweep(model: &MjModel, joint: usize, config: &CheckConfig, all_finite: &mut bool) -> Option<JointSweep> {
+/// A model's reference configuration may lie outside its joints' limits.
+fn within_limits(model: &MjModel, data: &mut MjData<&MjModel>) {
+    for j in (0..model.ffi().njnt as usize).filter(|&j| model.jnt_limited()[j]) {
+        if matches!(model.jnt_type()[j], MjtJoint::mjJNT_HINGE | MjtJoint::mjJNT_SLIDE) {
+            let [lo, hi] = model.jnt_range()[j];
+            let q = &mut data.qpos_mut()[model.jnt_qposadr()[j] as usize];
+            *q = q.clamp(lo, hi.max(lo));
+        }
+    }
+}
+
+/// Where the other joints are held during a sweep.
+#[derive(Clone, Copy, PartialEq)]
+enum Others {
+    /// As the model starts, within the limits.
+    Start,
+    /// At an end of their ranges.
+    End(usize),
+}
+
+/// A rack behind a door, a flap below a flap: what is stopped is tried again with all others at one
+/// end of their ranges, then at the other.
+fn best_sweep(model: &MjModel, joint: usize, config: &CheckConfig, finite: &mut bool) -> Option<JointSweep> {
+    let mut best = sweep(model, joint, Others::Start, config, finite)?;
+    for end in [1, 0] {
+        if best.reached < FREE && model.ffi().njnt > 1 {
+            let again = sweep(model, joint, Others::End(end), config, finite)?;
+            if again.reached > best.reached {
+                best = JointSweep { freed: true, ..again };
+            }
+        }
+    }
+    Some(best)
+}
+
+/// Drives one joint from end to end by a stiff servo, all others held, but for those that follow it.
+/// A joint that follows another is not driven.
+fn sweep(
+    model: &MjModel,
+    joint: usize,
+    others: Others,
+    config: &CheckConfig,
+    all_finite: &mut bool,
+) -> Option<JointSweep> {
     let speed = match model.jnt_type()[joint] {
         MjtJoint::mjJNT_HINGE => config.hinge_speed,
         MjtJoint::mjJNT_SLIDE => config.slide_speed,
@@ -157,6 +204,12 @@ fn sweep(model: &MjModel, joint: usize, config: &CheckConfig, all_finite: &mut b
     let nv = model.ffi().nv as usize;
     let dof = model.jnt_dofadr()[joint] as usize;
     let address = model.jnt_qposadr()[joint] as usize;
+    within_limits(model, &mut data);
+    if let Others::End(end) = others {
+        for j in (0..model.ffi().njnt as usize).filter(|&j| model.jnt_limited()[j]) {
+            data.qpos_mut()[model.jnt_qposadr()[j] as usize] = model.jnt_range()[j][end];
+        }
+    }
     data.qpos_mut()[address] = range[0];
     for _ in &couplings {
         for (follower, leader, polynomial) in &couplings {
@@ -173,6 +226,7 @@ fn sweep(model: &MjModel, joint: usize, config: &CheckConfig, all_finite: &mut b
         range,
         reached: 0.0,
         worst_lag: 0.0,
+        freed: false,
     };
     // Computed-torque servo: bias forces are cancelled, the error obeys a critically damped 10 Hz
     // spring.

@@ -6,7 +6,7 @@
 
 use crate::Twin;
 use glam::DVec3;
-use hingecast_geom::{Joint, TriMesh};
+use hingecast_geom::{Joint, KinematicTree, TriMesh};
 
 /// Origin of the link frame of `part`, canonical world.
 pub fn link_origin(twin: &Twin, part: usize) -> DVec3 {
@@ -16,6 +16,21 @@ pub fn link_origin(twin: &Twin, part: usize) -> DVec3 {
         Some(j) if j.screw.kind.turns() => j.screw.foot(com),
         Some(_) => com,
     }
+}
+
+/// Pairs of parts that touch by construction, carrier first: those that share a joint, and those
+/// that would if the parts of nothing between them (`is_empty`) were none.
+pub fn touching(tree: &KinematicTree, is_empty: impl Fn(usize) -> bool) -> Vec<[usize; 2]> {
+    let mut out = Vec::new();
+    for joint in &tree.joints {
+        let mut carrier = joint.parent;
+        out.push([carrier, joint.child]);
+        while let Some(up) = tree.joint_of(carrier).filter(|_| is_empty(carrier)) {
+            carrier = up.parent;
+            out.push([carrier, joint.child]);
+        }
+    }
+    out
 }
 
 /// Viscous damping of `joint`: not observable from still states, so chosen that a free swing loses

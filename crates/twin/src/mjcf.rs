@@ -1,7 +1,7 @@
 //! MJCF text of a twin: the same links and joints as the URDF, for MuJoCo.
 
 use crate::Twin;
-use crate::link::{damping, hull_file, link_origin, mean_color, visual_file};
+use crate::link::{damping, hull_file, link_origin, mean_color, touching, visual_file};
 use crate::xml::{escape, xyz};
 use glam::DVec3;
 use hingecast_geom::JointKind;
@@ -29,13 +29,9 @@ pub fn to_string(twin: &Twin) -> String {
     let _ = writeln!(out, "  </worldbody>\n  <contact>");
     // Parts that share a joint touch there by construction. MuJoCo filters such pairs itself only
     // when the parent can move.
-    for joint in &twin.tree.joints {
-        let _ = writeln!(
-            out,
-            "    <exclude body1=\"{}\" body2=\"{}\"/>",
-            escape(&twin.tree.parts[joint.parent]),
-            escape(&twin.tree.parts[joint.child])
-        );
+    for pair in touching(&twin.tree, |part| twin.parts[part].mesh.is_empty()) {
+        let [a, b] = pair.map(|part| escape(&twin.tree.parts[part]));
+        let _ = writeln!(out, "    <exclude body1=\"{a}\" body2=\"{b}\"/>");
     }
     let _ = writeln!(out, "  </contact>");
     if !twin.tree.couplings.is_empty() {

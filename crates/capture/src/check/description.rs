@@ -40,6 +40,8 @@ fn explain(documents: &[Document], problem: Problem) -> Finding {
         ("no frames", "no-frames"),
         ("held out", "no-training-frames"),
         ("image size", "image-size"),
+        ("a camera stands", "camera-far"),
+        ("principal point", "principal-point"),
         ("camera model", "camera-model"),
     ]
     .into_iter()
@@ -49,7 +51,7 @@ fn explain(documents: &[Document], problem: Problem) -> Finding {
     finding.fix = match (&problem.frame, code) {
         (_, "states-gap") => Some(Fix::RenumberStates),
         // A lens or a whole-file mistake concerns all frames: dropping them is no repair.
-        (_, "distortion" | "camera-model" | "focal-length" | "image-size") | (None, _) => None,
+        (_, "distortion" | "camera-model" | "focal-length" | "principal-point" | "image-size") | (None, _) => None,
         (Some((file, index)), "pose-not-rigid") => {
             let entry =
                 documents.iter().filter(|d| d.file == *file).flat_map(|d| &d.entries).find(|e| e.index == *index);

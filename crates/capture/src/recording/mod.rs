@@ -11,6 +11,7 @@ mod fields;
 mod fingerprint;
 pub mod images;
 mod packed_depth;
+mod stray;
 pub(crate) mod transforms;
 mod view;
 mod write;
@@ -83,6 +84,13 @@ pub struct Recording {
 /// pose does not.
 pub(crate) const MAX_RIGIDITY_ERROR: f64 = 1e-3;
 
+/// Focal lengths that lenses have, image widths: fields of view of 0.06 and 179 degrees.
+const NARROWEST: f64 = 0.009;
+const WIDEST: f64 = 1000.0;
+/// Farthest that a principal point is read from the middle of the image, image sizes: crops keep
+/// theirs.
+const FARTHEST_MIDDLE: f64 = 20.0;
+
 impl Recording {
     /// Opens a recording folder (or its `transforms.json`); reads no pixels.
     ///
@@ -102,7 +110,7 @@ impl Recording {
     /// problems are left out.
     pub(crate) fn from_documents(documents: &[Document], problems: &mut Vec<Problem>) -> Self {
         let root = documents.first().map(|d| d.root.clone()).unwrap_or_default();
-        let mut frames = Vec::new();
+        let (mut frames, mut origins) = (Vec::new(), Vec::new());
         let (mut name, mut metric, mut up) = (None, false, DVec3::Z);
         for document in documents {
             problems.extend(document.problems.iter().cloned());
@@ -113,11 +121,22 @@ impl Recording {
             for entry in &document.entries {
                 let next = next_view.entry(entry.state).or_default();
                 match frame(entry, *next) {
-                    Ok(f) => frames.push(f),
+                    Ok(f) => {
+                        frames.push(f);
+                        let place = format!("{}.transform_matrix", entry.place);
+                        origins.push((place, (document.file.clone(), entry.index)));
+                    }
                     Err(error) => problems.push(Problem { error, frame: Some((document.file.clone(), entry.index)) }),
                 }
                 *next += 1;
             }
+        }
+        let stray = stray::cameras(&frames.iter().map(|f: &Frame| f.camera.centre()).collect::<Vec<_>>());
+        for (i, what) in stray.into_iter().rev() {
+            let (place, origin) = origins.remove(i);
+            frames.remove(i);
+            let hint = "leave the frame out (hingecast check --fix), or correct its transform_matrix";
+            problems.push(Problem { error: CaptureError::new(what, place, hint), frame: Some(origin) });
         }
         let n_states = count_states(&frames, documents, problems);
         let folder = || root.file_name().map(|n| n.to_string_lossy().into_owned()).unwrap_or("recording".into());
@@ -148,6 +167,21 @@ fn frame(entry: &Entry, default_view: usize) -> Result<Frame, CaptureError> {
             "the focal length is not positive",
             place("fl_x, fl_y", format!("{}, {}", i.fx, i.fy)),
             "give the focal length in pixels, about the image width for a phone",
+        ));
+    }
+    let far = |c: f64, size: usize| !((c - 0.5 * size as f64).abs() <= FARTHEST_MIDDLE * size as f64);
+    if [i.fx, i.fy].iter().any(|f| !(NARROWEST..WIDEST).contains(&(f / i.width.max(1) as f64))) {
+        return Err(CaptureError::new(
+            "the focal length is absurd",
+            place("fl_x, fl_y", format!("{}, {} for {} x {} pixels", i.fx, i.fy, i.width, i.height)),
+            "give the focal length in pixels, about the image width for a phone",
+        ));
+    }
+    if far(i.cx, i.width) || far(i.cy, i.height) {
+        return Err(CaptureError::new(
+            "the principal point is absurd",
+            place("cx, cy", format!("{}, {} for {} x {} pixels", i.cx, i.cy, i.width, i.height)),
+            "give cx and cy in pixels of these images, about half of w and h",
         ));
     }
     if i.width == 0 || i.height == 0 {

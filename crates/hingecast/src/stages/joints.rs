@@ -17,7 +17,7 @@ pub fn run(parts: &Parts, splats: &Splats, corrections: &[JointOverride]) -> Res
         doubts: parts.doubted.clone(),
         certainty: parts.certainty.iter().cloned().map(Some).collect(),
     };
-    overrides::apply(&mut joints, corrections)?;
+    overrides::apply(&mut joints, corrections, &splats.extent)?;
     let (couplings, doubts) = coupling::find(&joints.tree, &joints.certainty, splats.extent.diagonal);
     joints.tree.couplings = couplings;
     joints.doubts.extend(doubts);
