@@ -171,6 +171,7 @@ fn split(demos: &Demos, config: &TrainConfig) -> Result<(Vec<usize>, Vec<usize>)
                 hint,
             ));
         }
+        demos.masks_apart(&config.train_mask, &config.valid_mask)?;
         return Ok((train, valid.unwrap_or_default()));
     }
     let count = demos.episodes.len();
