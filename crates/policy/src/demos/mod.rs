@@ -14,6 +14,7 @@
 mod links;
 mod masks;
 mod read;
+mod strings;
 mod write;
 
 pub use read::read;

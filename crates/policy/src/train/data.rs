@@ -257,6 +257,17 @@ mod tests {
         assert_eq!((single.train_demos, single.valid_demos), (1, 0));
     }
 
+    /// Masks of any name; robomimic refuses the same.
+    #[test]
+    fn what_validates_is_not_learnt_from() {
+        let mut demos = demos(4);
+        demos.masks.insert("mine".into(), vec!["demo_0".into(), "demo_2".into()]);
+        demos.masks.insert("valid".into(), vec!["demo_2".into(), "demo_3".into()]);
+        let e = Dataset::new(&demos, &TrainConfig { train_mask: "mine".into(), ..config() }).err().unwrap();
+        assert_eq!(e.place, "mask/mine and mask/valid: demo_2");
+        assert!(Dataset::new(&demos, &config()).is_ok(), "the mask mine is not used");
+    }
+
     #[test]
     fn what_cannot_be_learnt_is_refused() {
         let mut odd = demos(2);
