@@ -6,6 +6,8 @@
 
     scripts/policy_reference.py hdf5 OUT.hdf5          a file laid out as robomimic does: crates/policy/tests/data/robomimic.hdf5
     scripts/policy_reference.py sequences DEMOS.hdf5   reads a file of ours with robomimic's own SequenceDataset
+    scripts/policy_reference.py links FOLDER           files with links, strings and attributes of many kinds, all saying the same
+    scripts/policy_reference.py strings DEMOS.hdf5     a file of ours: attributes are str, datatypes are the HDF5 library's own
     scripts/policy_reference.py weights MODEL.pth OUT.safetensors     a robomimic checkpoint's weights for policy.safetensors
     scripts/policy_reference.py curve OUT.safetensors small|lift   200 steps of robomimic's actor and PyTorch's Adam: weights,
                                                        batches, first gradient, losses (crates/policy/tests/data/curve.safetensors)
@@ -67,6 +69,87 @@ def read_sequences(path):
         print(f"mask {mask}: {len(s)} windows of {len(s.demos)} demonstrations;",
               {k: v.shape for k, v in end["obs"].items()}, end["actions"].shape)
     assert len(s) == total == sum(lengths.values())
+
+
+def write_links(folder):
+    """Five layouts that h5py cannot tell apart when it reads, each with the library's oldest, usual and newest format."""
+    import h5py
+    import numpy as np
+    from h5py import h5a, h5s, h5t
+
+    def whole(f):
+        data = f.create_group("data")
+        data.attrs["env_args"] = json.dumps({"env_name": "Lift", "type": 1, "env_kwargs": {}})
+        # So many demonstrations that the newest format keeps their names in a tree.
+        for i in range(30):
+            demo = data.create_group(f"demo_{i}")
+            demo.attrs["num_samples"], demo.attrs["model_file"] = 4, "<mujoco model='é'/>"
+            demo["actions"], demo["rewards"] = np.full((4, 7), i / 100), np.zeros(4)
+            demo["obs/object"] = np.arange(8.0).reshape(4, 2) + i
+        f["mask/train"] = np.array(["demo_0", "demo_12"], dtype="S")
+        f["mask/valid"] = np.array(["demo_1"], dtype="S")
+
+    def soft(f):
+        for k, demo in f["data"].items():
+            demo.move("obs", "observations")
+            demo["obs"] = h5py.SoftLink(f"/data/{k}/observations" if k < "demo_2" else "./observations")
+        f.move("mask", "filters")
+        f["mask"], f["one"] = h5py.SoftLink("filters"), h5py.SoftLink("/data/demo_3/rewards")
+        del f["data/demo_4/rewards"]
+        f["data/demo_4/rewards"] = h5py.SoftLink("/one")
+
+    def hard(f):
+        f["shown"] = f["data"]
+        f.move("data/demo_5", "elsewhere")
+        f["data/demo_5"] = f["elsewhere"]
+        del f["data/demo_6/rewards"]
+        f["data/demo_6/rewards"] = h5py.SoftLink("/shown/demo_7/rewards")
+
+    def variable(f):
+        for mask in ["train", "valid"]:
+            names = f["mask"][mask].asstr()[:]
+            del f["mask"][mask]
+            f["mask"].create_dataset(mask, data=names, dtype=h5py.string_dtype("utf-8" if mask == "train" else "ascii"))
+        # More than eight: the newest format keeps them outside the header.
+        for demo in f["data"].values():
+            demo.attrs.update({f"more_{i}": i for i in range(12)})
+
+    def fixed(f):
+        for group, name, pad, fill in [(f["data"], "env_args", h5t.STR_SPACEPAD, b" "),
+                                       (f["data/demo_8"], "model_file", h5t.STR_NULLTERM, b"\0")]:
+            text = group.attrs[name].encode().ljust(80, fill)
+            del group.attrs[name]
+            kind = h5t.C_S1.copy()
+            kind.set_size(80), kind.set_strpad(pad), kind.set_cset(h5t.CSET_UTF8)
+            h5a.create(group.id, name.encode(), kind, h5s.create(h5s.SCALAR)).write(np.array(text, dtype="S80"), mtype=kind)
+
+    layouts = {"plain": None, "soft": soft, "hard": hard, "variable": variable, "fixed": fixed}
+    for name, change in layouts.items():
+        for libver in ["earliest", "latest", None]:
+            with h5py.File(f"{folder}/{name}_{libver or 'default'}.hdf5", "w", libver=libver) as f:
+                whole(f)
+                if change:
+                    change(f)
+
+
+def check_strings(path):
+    """What robomimic decodes is str or bytes as it expects; the datatypes are those that h5py itself writes."""
+    import io
+
+    import h5py
+    import numpy as np
+
+    with h5py.File(path) as f, h5py.File(io.BytesIO(), "w") as own:
+        own.attrs["text"], own["names"] = "é", np.array(["demo_12"], dtype="S")
+        text = own.attrs.get_id("text").get_type()
+        assert json.loads(f["data"].attrs["env_args"])["env_name"] == "Lift"
+        for group, name in [(f["data"], "env_args")] + [(demo, "model_file") for demo in f["data"].values()]:
+            assert isinstance(group.attrs[name], str), name
+            # Equal only with an equal base type.
+            assert group.attrs.get_id(name).get_type().equal(text), f"{group.name}@{name}"
+        assert f["mask/train"].id.get_type().equal(own["names"].id.get_type())
+        assert [n.decode("utf-8") for n in np.array(f["mask/train"][:])] == ["demo_0", "demo_12"]
+        assert f["data"].attrs["total"] == sum(d.attrs["num_samples"] for d in f["data"].values())
 
 
 def actor(inputs, hidden, min_std=1e-4):
@@ -165,7 +248,8 @@ def speed(binary, hidden="400", threads="1"):
 
 
 if __name__ == "__main__":
-    verbs = {"speed": speed, "curve": curve, "weights": weights, "hdf5": write_hdf5, "sequences": read_sequences}
+    verbs = {"speed": speed, "curve": curve, "weights": weights, "hdf5": write_hdf5, "sequences": read_sequences, "links": write_links,
+             "strings": check_strings}
     if len(sys.argv) < 3 or sys.argv[1] not in verbs:
         sys.exit(__doc__)
     verbs[sys.argv[1]](*sys.argv[2:])

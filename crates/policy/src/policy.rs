@@ -85,12 +85,19 @@ pub struct Policy {
 impl Policy {
     /// A policy from its parts.
     ///
-    /// # Panics
-    /// Parameters of another network.
-    pub fn new(config: PolicyConfig, parameters: Vec<f32>) -> Self {
+    /// # Errors
+    /// A normalisation of other sizes than the observations, and whatever else [`Policy::load`]
+    /// would not read again; parameters of another network.
+    pub fn new(config: PolicyConfig, parameters: Vec<f32>) -> Result<Self, PolicyError> {
+        let refuse = |what: String| {
+            PolicyError::new(what, "the policy's configuration", "take net, obs and normalization of one training")
+        };
+        config.check().map_err(refuse)?;
         let net = Network::new(&config.net, config.inputs());
-        assert_eq!(parameters.len(), net.parameters());
-        Self { config, net, parameters }
+        if parameters.len() != net.parameters() {
+            return Err(refuse(format!("{} weights, {} are expected", parameters.len(), net.parameters())));
+        }
+        Ok(Self { config, net, parameters })
     }
 
     /// Writes `policy.safetensors`, then `policy.json`: where the second is, the first is whole.

@@ -81,7 +81,7 @@ fn compare(path: &Path) {
     // The trained weights, put into a policy by their names, say what robomimic's network says in
     // evaluation.
     let obs = vec![ObsKey { key: "object".into(), width: inputs }];
-    let policy = Policy::new(PolicyConfig::new(obs, steps, config, None, 200), moved);
+    let policy = Policy::new(PolicyConfig::new(obs, steps, config, None, 200), moved).unwrap();
     let dir = tempfile::tempdir().unwrap();
     policy.save(dir.path()).unwrap();
     let policy = Policy::load(dir.path()).unwrap();

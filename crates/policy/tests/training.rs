@@ -4,7 +4,7 @@
 use hingecast_geom::Progress;
 use hingecast_policy::net::Head;
 use hingecast_policy::train::{Preset, TrainConfig, TrainReport, train};
-use hingecast_policy::{Actor, Demos, Episode, Policy, PolicyError};
+use hingecast_policy::{Actor, Demos, Episode, Normalization, Policy, PolicyError};
 use std::collections::BTreeMap;
 use std::path::Path;
 use std::sync::Arc;
@@ -205,6 +205,15 @@ fn damaged_policies_are_named() {
     assert!(e.place.starts_with("observation object: not among"), "{e}");
     let e = policy.input(&[("object".to_string(), vec![0.0])].into()).unwrap_err();
     assert_eq!(e.place, "observation object: 1 numbers, 2 expected");
+
+    // Two numbers are observed: three means would have moved every later observation by one.
+    let mut odd = policy.config.clone();
+    let n = Normalization { mean: vec![0.0; 3], std: vec![1.0; 3] };
+    odd.normalization = Some(n);
+    let e = Policy::new(odd, policy.parameters.clone()).unwrap_err();
+    assert!(e.what.ends_with("3 means, 3 stds, 2 observed numbers"), "{e}");
+    let e = Policy::new(policy.config.clone(), vec![0.0; 3]).unwrap_err();
+    assert!(e.what.starts_with("3 weights, "), "{e}");
 
     let mut odd = policy.clone();
     odd.parameters[5] = f32::INFINITY;

@@ -11,7 +11,10 @@
 //! `scripts/dataset_states_to_obs.py` (what it writes). All numbers are f64 here and in the files
 //! that we write; f32 and integers are read as well.
 
+mod links;
+mod masks;
 mod read;
+mod strings;
 mod write;
 
 pub use read::read;
@@ -79,18 +82,8 @@ fn check(demos: &Demos, file: &str) -> Result<(), PolicyError> {
         check_episode(episode, &format!("{file}, data/demo_{i}"))?;
     }
     check_keys(&demos.episodes, file)?;
-    for (mask, names) in &demos.masks {
-        for name in names {
-            if index_of(name).is_none_or(|i| i >= demos.episodes.len()) {
-                return Err(PolicyError::new(
-                    "a mask names a demonstration that is not there",
-                    format!("{file}, mask/{mask}: {name}"),
-                    "write the masks again, or delete the group mask: then 90 % train and 10 % validate",
-                ));
-            }
-        }
-    }
-    Ok(())
+    let is_there = |name: &str| index_of(name).is_some_and(|i| i < demos.episodes.len());
+    masks::check(&demos.masks, is_there, file)
 }
 
 fn check_episode(e: &Episode, place: &str) -> Result<(), PolicyError> {

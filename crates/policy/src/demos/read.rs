@@ -1,10 +1,16 @@
 //! Reads robomimic's files, and says which field of a damaged one is wrong.
 
-use super::{Demos, Episode, check, index_of};
+use super::links::{Found, Wrong, find};
+use super::{Demos, Episode, check, index_of, masks};
 use crate::{ACTION_SIZE, PolicyError};
 use rust_hdf5::{DatatypeMessage, H5Dataset, H5File, H5Group, Hdf5Error};
+use std::cell::Cell;
 use std::collections::BTreeMap;
 use std::path::Path;
+
+/// Deflate, the densest packing that is read, makes at most 1032 bytes out of one. A file that
+/// says it holds more lies about its shapes, and would otherwise decide how much memory we take.
+const MOST_UNPACKED: u64 = 1032;
 
 /// Reads all demonstrations of `path`. Where numbers are missing among `demo_<i>`, the episodes
 /// move up and the masks follow. Observations that are pictures (more than two axes) are left out.
@@ -19,24 +25,29 @@ pub fn read(path: &Path) -> Result<Demos, PolicyError> {
         let hint = "give a file that `hingecast demos` or robomimic wrote";
         return Err(PolicyError::new("not an HDF5 file", format!("{file}: its first bytes are {head:02x?}"), hint));
     }
+    let bytes = std::fs::metadata(path).map_err(|e| PolicyError::read(path, e))?.len();
     let h5 = H5File::open(path).map_err(|e| damaged(&file, e))?;
     let root = h5.root_group();
-    let reader = Reader { file, h5 };
+    let reader = Reader { file, h5, budget: Cell::new(bytes.saturating_mul(MOST_UNPACKED)) };
     let data = reader.group(&root, "data", "data")?;
     let env_args = reader.env_args(&data)?;
 
     // demo_10 comes after demo_9, not after demo_1.
-    let names = data.group_names().map_err(|e| reader.damaged("data", e))?;
+    let names = data.link_names().map_err(|e| reader.damaged("data", e))?;
     let mut names: Vec<(usize, String)> = names.into_iter().filter_map(|n| Some((index_of(&n)?, n))).collect();
     names.sort();
     let mut episodes = Vec::with_capacity(names.len());
-    for (_, name) in &names {
+    let mut new_names: BTreeMap<String, String> = BTreeMap::new();
+    for (_, name) in names {
         let place = format!("data/{name}");
-        episodes.push(reader.episode(&reader.group(&data, name, &place)?, &place)?);
+        if let Found::Group(group) = reader.find(&data, &name, &place)? {
+            new_names.insert(name, format!("demo_{}", episodes.len()));
+            episodes.push(reader.episode(&group, &place)?);
+        }
     }
-    let new_names: BTreeMap<&str, String> =
-        names.iter().enumerate().map(|(i, (_, name))| (name.as_str(), format!("demo_{i}"))).collect();
-    let masks = reader.masks(&root, &new_names)?;
+    let mut masks = reader.masks(&root)?;
+    masks::check(&masks, |name| new_names.contains_key(name), &reader.file)?;
+    masks.values_mut().flatten().for_each(|name| *name = new_names[name.as_str()].clone());
     let demos = Demos { env_args, episodes, masks };
     check(&demos, &reader.file)?;
     Ok(demos)
@@ -63,6 +74,8 @@ fn damaged(place: &str, e: Hdf5Error) -> PolicyError {
 struct Reader {
     file: String,
     h5: H5File,
+    /// Bytes that may still be read.
+    budget: Cell<u64>,
 }
 
 impl Reader {
@@ -78,10 +91,35 @@ impl Reader {
         )
     }
 
+    /// What a name in `parent` leads to, through all links.
+    fn find(&self, parent: &H5Group, name: &str, place: &str) -> Result<Found, PolicyError> {
+        find(&self.h5, parent, name).map_err(|wrong| match wrong {
+            Wrong::File(e) => self.damaged(place, e),
+            Wrong::Link(what, link) => PolicyError::new(
+                what,
+                format!("{}, {place}: {link}", self.file),
+                "copy what it leads to into the file (h5py: file.copy), or remove the link",
+            ),
+        })
+    }
+
     fn group(&self, parent: &H5Group, name: &str, place: &str) -> Result<H5Group, PolicyError> {
-        parent.group(name).map_err(|e| match e {
-            Hdf5Error::NotFound(_) => self.missing(place),
-            e => self.damaged(place, e),
+        match self.find(parent, name, place)? {
+            Found::Group(group) => Ok(group),
+            _ => Err(self.missing(place)),
+        }
+    }
+
+    /// Takes `bytes` off what may still be read.
+    fn spend(&self, bytes: Option<u64>, place: &str, shape: &[usize]) -> Result<(), PolicyError> {
+        let left = bytes.and_then(|bytes| self.budget.get().checked_sub(bytes));
+        self.budget.set(left.unwrap_or(0));
+        left.map(|_| ()).ok_or_else(|| {
+            PolicyError::new(
+                "a file that says it holds more than can be packed into it",
+                format!("{}, {place}: shape {shape:?}", self.file),
+                "record it again; a file cut short, or made to exhaust memory, looks like this",
+            )
         })
     }
 
@@ -92,7 +130,7 @@ impl Reader {
             return Err(self.missing(place));
         }
         let text = data.attr_string("env_args").map_err(|e| self.damaged(place, e))?;
-        serde_json::from_str(&text).map_err(|e| {
+        serde_json::from_str(text.trim_end_matches('\0')).map_err(|e| {
             PolicyError::new(
                 format!("not JSON: {e}"),
                 format!("{}, {place}", self.file),
@@ -102,19 +140,19 @@ impl Reader {
     }
 
     fn episode(&self, group: &H5Group, place: &str) -> Result<Episode, PolicyError> {
-        let datasets = group.dataset_names().map_err(|e| self.damaged(place, e))?;
-        let groups = group.group_names().map_err(|e| self.damaged(place, e))?;
         let attributes = group.attr_names().map_err(|e| self.damaged(place, e))?;
         let optional = |name: &str| -> Result<Option<Table>, PolicyError> {
-            if !datasets.iter().any(|d| d == name) {
-                return Ok(None);
+            let place = format!("{place}/{name}");
+            match self.find(group, name, &place)? {
+                Found::Dataset(dataset) => self.table(&dataset, &place),
+                _ => Ok(None),
             }
-            self.table(group, name, &format!("{place}/{name}"))
         };
         let model_file = match attributes.iter().any(|a| a == "model_file") {
             true => group.attr_string("model_file").map_err(|e| self.damaged(&format!("{place}, model_file"), e))?,
             false => String::new(),
         };
+        self.spend(Some(model_file.len() as u64), &format!("{place}, model_file"), &[model_file.len()])?;
 
         let actions = optional("actions")?.ok_or_else(|| self.missing(&format!("{place}/actions")))?;
         if actions.width != ACTION_SIZE {
@@ -126,38 +164,35 @@ impl Reader {
         }
         let column =
             |name: &str| -> Result<Vec<f64>, PolicyError> { Ok(optional(name)?.map_or(Vec::new(), |t| t.values)) };
-        let observations = |name: &str| -> Result<BTreeMap<String, Vec<Vec<f64>>>, PolicyError> {
-            if !groups.iter().any(|g| g == name) {
-                return Ok(BTreeMap::new());
-            }
+        let observations = |name: &str| -> Result<Option<Observations>, PolicyError> {
             let place = format!("{place}/{name}");
-            let group = self.group(group, name, &place)?;
             let mut out = BTreeMap::new();
-            for key in group.dataset_names().map_err(|e| self.damaged(&place, e))? {
-                if let Some(table) = self.table(&group, &key, &format!("{place}/{key}"))? {
+            let Found::Group(group) = self.find(group, name, &place)? else {
+                return Ok(None);
+            };
+            for key in group.link_names().map_err(|e| self.damaged(&place, e))? {
+                let place = format!("{place}/{key}");
+                if let Found::Dataset(dataset) = self.find(&group, &key, &place)?
+                    && let Some(table) = self.table(&dataset, &place)?
+                {
                     out.insert(key, table.into_rows());
                 }
             }
-            Ok(out)
+            Ok(Some(out))
         };
-        if !groups.iter().any(|g| g == "obs") {
-            return Err(self.missing(&format!("{place}/obs")));
-        }
         Ok(Episode {
             model_file,
             actions: actions.values.chunks_exact(ACTION_SIZE).map(|a| a.try_into().expect("seven")).collect(),
             states: optional("states")?.map_or(Vec::new(), Table::into_rows),
             rewards: column("rewards")?,
             dones: column("dones")?.iter().map(|d| *d != 0.0).collect(),
-            obs: observations("obs")?,
-            next_obs: observations("next_obs")?,
+            obs: observations("obs")?.ok_or_else(|| self.missing(&format!("{place}/obs")))?,
+            next_obs: observations("next_obs")?.unwrap_or_default(),
         })
     }
 
     /// A dataset of one or two axes as f64; `None` for pictures. Everything is widened to f64.
-    fn table(&self, group: &H5Group, name: &str, place: &str) -> Result<Option<Table>, PolicyError> {
-        let path = format!("{}/{name}", group.name().trim_start_matches('/'));
-        let dataset = self.h5.dataset(&path).map_err(|e| self.damaged(place, e))?;
+    fn table(&self, dataset: &H5Dataset, place: &str) -> Result<Option<Table>, PolicyError> {
         let shape = dataset.shape();
         let (rows, width) = match shape[..] {
             [rows] => (rows, 1),
@@ -168,7 +203,20 @@ impl Reader {
             }
             _ => return Ok(None),
         };
-        let values = self.numbers(&dataset).map_err(|e| self.damaged(place, e))?;
+        let refuse = |what: &str| {
+            let hint = "write it again with one row of numbers per step";
+            PolicyError::new(what, format!("{}, {place}: shape {shape:?}", self.file), hint)
+        };
+        if rows > 0 && width == 0 {
+            return Err(refuse("rows without numbers"));
+        }
+        let count = rows.checked_mul(width);
+        let size = dataset.element_size().max(size_of::<f64>()) as u64;
+        self.spend(count.and_then(|n| size.checked_mul(n as u64)), place, &shape)?;
+        let values = self.numbers(dataset).map_err(|e| self.damaged(place, e))?;
+        if Some(values.len()) != count {
+            return Err(refuse(&format!("{} numbers, which do not fill the shape", values.len())));
+        }
         Ok(Some(Table { rows, width, values }))
     }
 
@@ -185,27 +233,29 @@ impl Reader {
         }
     }
 
-    /// Masks with the episodes' new names.
-    fn masks(
-        &self,
-        root: &H5Group,
-        new_names: &BTreeMap<&str, String>,
-    ) -> Result<BTreeMap<String, Vec<String>>, PolicyError> {
+    /// Masks with the names of the file.
+    fn masks(&self, root: &H5Group) -> Result<BTreeMap<String, Vec<String>>, PolicyError> {
         let mut out = BTreeMap::new();
-        if !root.group_names().map_err(|e| self.damaged("mask", e))?.iter().any(|n| n == "mask") {
+        let Found::Group(group) = self.find(root, "mask", "mask")? else {
             return Ok(out);
-        }
-        let group = self.group(root, "mask", "mask")?;
-        for mask in group.dataset_names().map_err(|e| self.damaged("mask", e))? {
+        };
+        for mask in group.link_names().map_err(|e| self.damaged("mask", e))? {
             let place = format!("mask/{mask}");
-            let names = self.h5.dataset(&place).and_then(|d| d.read_strings());
-            let names = names.map_err(|e| self.damaged(&place, e))?;
-            // A name that is not there stays as it is: the check says so.
-            out.insert(mask, names.into_iter().map(|n| new_names.get(n.as_str()).cloned().unwrap_or(n)).collect());
+            if let Found::Dataset(dataset) = self.find(&group, &mask, &place)? {
+                let count = dataset.shape().iter().try_fold(1u64, |n, axis| n.checked_mul(*axis as u64));
+                let bytes = count.and_then(|n| n.checked_mul(dataset.element_size() as u64));
+                self.spend(bytes, &place, &dataset.shape())?;
+                let names = dataset.read_strings().map_err(|e| self.damaged(&place, e))?;
+                // C programs count a string's last zero in.
+                out.insert(mask, names.into_iter().map(|n| n.trim_end_matches('\0').to_string()).collect());
+            }
         }
         Ok(out)
     }
 }
+
+/// Per key T rows.
+type Observations = BTreeMap<String, Vec<Vec<f64>>>;
 
 /// Row-major.
 struct Table {
@@ -216,9 +266,7 @@ struct Table {
 
 impl Table {
     fn into_rows(self) -> Vec<Vec<f64>> {
-        if self.width == 0 {
-            return vec![Vec::new(); self.rows];
-        }
-        self.values.chunks_exact(self.width).map(<[f64]>::to_vec).collect()
+        // Nothing is repeated by the file's count: without numbers there are no rows.
+        self.values.chunks_exact(self.width.max(1)).map(<[f64]>::to_vec).collect()
     }
 }

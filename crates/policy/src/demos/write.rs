@@ -1,9 +1,10 @@
 //! Writes what robomimic's `SequenceDataset` reads.
 
+use super::strings::{ROOM, settle};
 use super::{Demos, check};
 use crate::{ACTION_SIZE, PolicyError};
 use hingecast_geom::staging::write_through;
-use rust_hdf5::{H5File, H5Group, Hdf5Error};
+use rust_hdf5::{DatatypeMessage, H5File, H5Group, Hdf5Error};
 use std::path::Path;
 
 /// Writes `demos` out of sight and renames the file into place: it is whole or absent.
@@ -12,20 +13,26 @@ use std::path::Path;
 /// Demonstrations that [`super::read()`] would refuse, or a folder that cannot be written.
 pub fn write(path: &Path, demos: &Demos) -> Result<(), PolicyError> {
     check(demos, &path.display().to_string())?;
-    write_through(path, |new| write_file(new, demos).map_err(std::io::Error::other))
-        .map_err(|e: std::io::Error| PolicyError::write(path, e))
+    write_through(path, |new| {
+        let strings = write_file(new, demos).map_err(std::io::Error::other)?;
+        settle(new, strings)
+    })
+    .map_err(|e: std::io::Error| PolicyError::write(path, e))
 }
 
-fn write_file(path: &Path, demos: &Demos) -> Result<(), Hdf5Error> {
+/// Number of string attributes, which still have [`ROOM`] behind their names.
+fn write_file(path: &Path, demos: &Demos) -> Result<usize, Hdf5Error> {
     let file = H5File::create(path)?;
     let data = file.create_group("data")?;
-    data.set_attr_string("env_args", &demos.env_args.to_string())?;
+    let mut strings = 1;
+    data.set_attr_string(&format!("env_args{ROOM}"), &demos.env_args.to_string())?;
     data.set_attr_numeric("total", &(demos.steps() as i64))?;
     for (i, episode) in demos.episodes.iter().enumerate() {
         let group = data.create_group(&format!("demo_{i}"))?;
         group.set_attr_numeric("num_samples", &(episode.actions.len() as i64))?;
         if !episode.model_file.is_empty() {
-            group.set_attr_string("model_file", &episode.model_file)?;
+            group.set_attr_string(&format!("model_file{ROOM}"), &episode.model_file)?;
+            strings += 1;
         }
         let actions: Vec<f64> = episode.actions.iter().flatten().copied().collect();
         dataset(&group, "actions", &[episode.actions.len(), ACTION_SIZE], &actions)?;
@@ -50,11 +57,25 @@ fn write_file(path: &Path, demos: &Demos) -> Result<(), Hdf5Error> {
     if !demos.masks.is_empty() {
         let masks = file.create_group("mask")?;
         for (mask, names) in &demos.masks {
-            let names: Vec<&str> = names.iter().map(String::as_str).collect();
-            masks.write_vlen_strings(mask, &names)?;
+            mask_names(&masks, mask, names)?;
         }
     }
-    file.close()
+    file.close()?;
+    Ok(strings)
+}
+
+/// Strings of one length filled up with zeros, ASCII: what robomimic writes (numpy's `S`), and what
+/// every h5py returns as bytes, which robomimic decodes.
+fn mask_names(group: &H5Group, mask: &str, names: &[String]) -> Result<(), Hdf5Error> {
+    let width = names.iter().map(String::len).max().unwrap_or(0).max(1);
+    let mut bytes = Vec::with_capacity(names.len() * width);
+    for (i, name) in names.iter().enumerate() {
+        bytes.extend_from_slice(name.as_bytes());
+        bytes.resize((i + 1) * width, 0);
+    }
+    let kind = DatatypeMessage::FixedString { size: width as u32, padding: 1, charset: 0 };
+    let dataset = group.new_dataset::<u8>().datatype(kind).shape([names.len()]).create(mask)?;
+    if bytes.is_empty() { Ok(()) } else { dataset.write_raw_bytes(&bytes) }
 }
 
 /// Rows of one width; nothing for no rows.

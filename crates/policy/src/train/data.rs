@@ -171,6 +171,7 @@ fn split(demos: &Demos, config: &TrainConfig) -> Result<(Vec<usize>, Vec<usize>)
                 hint,
             ));
         }
+        demos.masks_apart(&config.train_mask, &config.valid_mask)?;
         return Ok((train, valid.unwrap_or_default()));
     }
     let count = demos.episodes.len();
@@ -254,6 +255,17 @@ mod tests {
         assert_ne!(data.fingerprint(), other.fingerprint());
         let single = Dataset::new(&super::tests::demos(1), &config()).unwrap();
         assert_eq!((single.train_demos, single.valid_demos), (1, 0));
+    }
+
+    /// Masks of any name; robomimic refuses the same.
+    #[test]
+    fn what_validates_is_not_learnt_from() {
+        let mut demos = demos(4);
+        demos.masks.insert("mine".into(), vec!["demo_0".into(), "demo_2".into()]);
+        demos.masks.insert("valid".into(), vec!["demo_2".into(), "demo_3".into()]);
+        let e = Dataset::new(&demos, &TrainConfig { train_mask: "mine".into(), ..config() }).err().unwrap();
+        assert_eq!(e.place, "mask/mine and mask/valid: demo_2");
+        assert!(Dataset::new(&demos, &config()).is_ok(), "the mask mine is not used");
     }
 
     #[test]

@@ -119,7 +119,7 @@ pub fn train(
             note = format!("loss {train:.3}") + &valid.map_or(String::new(), |v| format!(", validation {v:.3}"));
         }
         if config.snapshot_every > 0 && step.is_multiple_of(config.snapshot_every) {
-            policy(&state).save(&folder.join(format!("snapshots/step_{step:07}")))?;
+            policy(&state)?.save(&folder.join(format!("snapshots/step_{step:07}")))?;
         }
         let stopped = progress.report(step, config.steps, &note);
         if stopped.is_err() || last || step.is_multiple_of(config.checkpoint_every) {
@@ -134,7 +134,7 @@ pub fn train(
         return Err(diverged(config.steps, config));
     }
     write_losses(&folder.join("losses.csv"), &state.history)?;
-    policy(&state).save(folder)?;
+    policy(&state)?.save(folder)?;
     Ok(TrainReport {
         resumed_from,
         steps: config.steps,
