@@ -11,7 +11,7 @@ use glam::{DVec3, Vec3};
 use hingecast_capture::object::{ArticulatedObject, PartGeometry};
 use hingecast_capture::synth::{UsefulRange, useful_ranges};
 use hingecast_geom::folder::{may_be_emptied, may_become};
-use hingecast_geom::{Progress, TriMesh};
+use hingecast_geom::{JointKind, Progress, TriMesh};
 use hingecast_twin::hulls::{HullConfig, decompose};
 use hingecast_twin::link::touching;
 use hingecast_twin::separate::separate;
@@ -76,6 +76,10 @@ pub fn import(source: &Path, out: &Path, config: &ImportConfig, progress: &Progr
     let mut useful = useful;
     for (joint, range) in object.tree.joints.iter_mut().zip(&mut useful) {
         let [from, to] = joint.limits;
+        if joint.screw.kind == JointKind::Continuous {
+            *range = UsefulRange { lower: from, upper: to, behind: false };
+            continue;
+        }
         if (range.upper - range.lower).abs() < STUCK * (to - from) {
             // A button that sinks into its body, a lid modelled inside its neck.
             changes.push(format!(
@@ -192,7 +196,7 @@ pub fn import(source: &Path, out: &Path, config: &ImportConfig, progress: &Progr
 /// overlap as they are modelled.
 const STUCK: f64 = 0.1;
 /// Configurations of a joint's range at which its parts are kept clear of others.
-const STOPS: usize = 7;
+const STOPS: usize = 61;
 /// Gap that is left between pieces of different parts, share of the object's diagonal.
 const GAP: f64 = 5e-4;
 
@@ -328,5 +332,28 @@ mod tests {
         let knob = hulls.iter().filter_map(TriMesh::bounds).find(|(lo, _)| lo.y > 0.04);
         let (lo, hi) = knob.expect("a piece in front of the door");
         assert!((hi - lo).length() < 0.08, "{lo} {hi}");
+    }
+
+    /// Convex pieces of a flap and of the drawer below it overlap as they are decomposed: once
+    /// neither could move.
+    #[cfg(feature = "mujoco")]
+    #[test]
+    fn neighbours_do_not_stop_each_other() {
+        let text = r#"<mujoco><compiler angle="radian"/><worldbody>
+          <body name="case"><geom type="box" size=".2 .2 .01"/><geom type="box" size=".2 .01 .2" pos="0 .2 .2"/>
+            <body name="flap" pos="0 0 .2"><joint name="turn" axis="-1 0 0" pos="0 .19 0" range="0 1.4"/>
+              <geom type="box" size=".18 .18 .012"/></body>
+            <body name="drawer" pos="0 0 .1"><joint name="pull" type="slide" axis="0 -1 0" range="0 .2"/>
+              <geom type="box" size=".18 .18 .01"/><geom type="box" size=".18 .01 .096" pos="0 -.17 0"/></body>
+          </body></worldbody></mujoco>"#;
+        let dir = tempfile::tempdir().unwrap();
+        let file = dir.path().join("object.xml");
+        std::fs::write(&file, text).unwrap();
+        let out = dir.path().join("out");
+        let imported = import(&file, &out, &ImportConfig::default(), &Progress::default()).unwrap();
+        assert_eq!(imported.parts, 3);
+        let check = hingecast_sim::check_file(&out.join("robot.xml"), &Default::default()).unwrap();
+        assert_eq!(check.doubts(imported.diagonal), Vec::<String>::new());
+        assert!(check.rest_penetration < 1e-3, "{}", check.rest_penetration);
     }
 }

@@ -11,6 +11,9 @@ use std::path::Path;
 /// Share of its range that a joint must reach.
 const FREE: f64 = 0.98;
 
+/// Shortest time that a joint is driven over its range, s.
+const LEAST_SECS: f64 = 1.0;
+
 /// How a model is tried.
 #[derive(Clone, Copy, Debug)]
 pub struct CheckConfig {
@@ -200,6 +203,8 @@ fn sweep(
         return None;
     }
     let range = joint_range(model, joint);
+    // A button of 3 mm is not pressed in the time in which a servo settles.
+    let speed = f64::min(speed, (range[1] - range[0]) / LEAST_SECS).max(1e-9);
     let mut data = MjData::new(model);
     let nv = model.ffi().nv as usize;
     let dof = model.jnt_dofadr()[joint] as usize;

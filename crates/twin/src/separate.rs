@@ -63,7 +63,8 @@ pub fn separate(
         let mut cut = std::mem::take(&mut hulls[part]);
         for &other in order[..k].iter().filter(|&&other| meets(part, other)) {
             let still: Vec<Piece> = hulls[other].iter().filter_map(piece).collect();
-            let other_from_part: Vec<Pose> = poses.iter().map(|at| at[other].inverse() * at[part]).collect();
+            let mut other_from_part: Vec<Pose> = poses.iter().map(|at| at[other].inverse() * at[part]).collect();
+            other_from_part.dedup();
             let results: Vec<Option<TriMesh>> =
                 cut.par_iter().map(|hull| clear_of(hull, &still, &other_from_part, clearance)).collect();
             dropped += results.iter().filter(|r| r.is_none()).count();
