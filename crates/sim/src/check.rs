@@ -12,7 +12,7 @@ use std::path::Path;
 const FREE: f64 = 0.98;
 
 /// Shortest time that a joint is driven over its range, s.
-const LEAST_SECS: f64 = 1.0;
+const LEAST_SECS: f64 = 0.25;
 
 /// How a model is tried.
 #[derive(Clone, Copy, Debug)]

@@ -10,6 +10,7 @@
 //! turns with the part.
 
 mod judge;
+mod reach;
 
 use crate::SimError;
 use crate::object::{self, ObjectJoint, bounds, hangs_on, write_pose};
@@ -18,6 +19,7 @@ use crate::task::{TABLE, TaskKind, TaskSpec};
 use glam::{DMat3, DQuat, DVec3};
 use hingecast_geom::{JointKind, Pose, Screw};
 use mujoco_rs::prelude::*;
+use reach::{farthest, hardly_moves, reachable_scale, two_digits};
 use std::f64::consts::{FRAC_PI_2, FRAC_PI_4};
 use std::path::Path;
 use std::sync::Arc;
@@ -157,53 +159,11 @@ fn data_at(data: &Probe) -> Probe {
     copy
 }
 
-/// Two digits: a twin whose box differs by a voxel gets the same scale.
-fn two_digits(s: f64) -> f64 {
-    let unit = 10f64.powf(s.log10().floor() - 1.0);
-    (s / unit).floor() * unit
-}
-
-fn corners([lo, hi]: [DVec3; 2]) -> impl Iterator<Item = DVec3> {
-    (0..8).map(move |k: usize| {
-        let pick = |bit: usize, l: f64, h: f64| if k >> bit & 1 == 0 { l } else { h };
-        DVec3::new(pick(0, lo.x, hi.x), pick(1, lo.y, hi.y), pick(2, lo.z, hi.z))
-    })
-}
-
-/// How far the farthest corner of a box goes.
-fn farthest(part: [DVec3; 2], motion: &Pose) -> f64 {
-    corners(part).map(|c| motion.apply(c).distance(c)).fold(0.0, f64::max)
-}
-
-/// At most 1; so that the farthest point of the part neither travels nor stands beyond what the arm
-/// does with ease.
-fn reachable_scale(data: &mut Probe, hand: Hand, joint: &ObjectJoint) -> f64 {
-    let (closed, open) = ends(data, hand, joint);
-    pose_joint(data, joint, closed);
-    let Some([lo, hi]) = object_bounds(data, hand) else { return 1.0 };
-    let part = bounds(data, |g| is_part(data.model(), g, joint)).unwrap_or([lo, hi]);
-    let screw = object::screw(data, joint);
-    let motion = screw.motion(0.6 * (open - closed));
-    // The grasp is somewhere short of the farthest corner; 0.85 of it is usual.
-    let way = 0.85 * farthest(part, &motion);
-    let top = corners(part).map(|c| motion.apply(c).z.max(c.z) - lo.z).fold(0.0, f64::max);
-    let limits = [LONGEST_WAY / way, HIGHEST / top, LARGEST / (hi - lo).length()];
-    two_digits(limits.into_iter().filter(|s| s.is_finite() && *s > 0.0).fold(1.0, f64::min))
-}
-
 /// What is found at one size of the object.
 enum Reached {
     Places(Vec<Candidate>),
     /// No point of the part goes farther than this, m.
     HardlyMoves(f64),
-}
-
-fn hardly_moves(joint: &ObjectJoint, way: f64, place: String) -> SimError {
-    let [lo, hi] = joint.range;
-    let range = if joint.slides { format!("{lo} .. {hi}") } else { format!("{:.2} deg", (hi - lo).to_degrees()) };
-    let what = format!("joint '{}' hardly moves: {range}, {:.1} mm at most", joint.name, 1e3 * way);
-    let hint = "does the file count in radians? <compiler angle=\"radian\"/>; or take another --joint";
-    SimError::task(what, place, hint)
 }
 
 fn at_scale(path: &Path, kind: TaskKind, name: &str, scale: f64) -> Result<Reached, SimError> {
