@@ -11,11 +11,11 @@ use glam::{DVec3, Vec3};
 use hingecast_capture::object::{ArticulatedObject, PartGeometry};
 use hingecast_capture::synth::{UsefulRange, useful_ranges};
 use hingecast_geom::folder::{may_be_emptied, may_become};
-use hingecast_geom::{JointKind, Progress, TriMesh};
+use hingecast_geom::{JointKind, KinematicTree, Progress, TriMesh};
 use hingecast_twin::hulls::{HullConfig, decompose};
 use hingecast_twin::link::touching;
 use hingecast_twin::separate::separate;
-use hingecast_twin::{PartModel, Twin, mass};
+use hingecast_twin::{Inertial, PartModel, Twin, mass};
 use rayon::prelude::*;
 use serde::Serialize;
 use std::collections::HashMap;
@@ -158,8 +158,9 @@ pub fn import(source: &Path, out: &Path, config: &ImportConfig, progress: &Progr
         changes.push(format!("{lost} of {before} collision pieces stood in the way of other parts and were left out"));
     }
     changes.extend(doubts.into_iter().flatten());
+    weigh_links(&object.tree, &mut parts);
     for part in parts.iter().filter(|p| p.mesh.is_empty()) {
-        changes.push(format!("part '{}' has no surface", part.name));
+        changes.push(format!("part '{}' has no surface: a hundredth of what hangs on it is its mass", part.name));
     }
     let hulls = parts.iter().map(|p| p.hulls.len()).sum();
     changes.push(format!("surfaces became {hulls} convex collision pieces"));
@@ -190,6 +191,19 @@ pub fn import(source: &Path, out: &Path, config: &ImportConfig, progress: &Progr
         diagonal,
         changes,
     })
+}
+
+/// A part of nothing between two joints still needs a mass: a hundredth of what it carries.
+fn weigh_links(tree: &KinematicTree, parts: &mut [PartModel]) {
+    let mut order: Vec<usize> = (0..parts.len()).filter(|&p| parts[p].mesh.is_empty()).collect();
+    // What hangs farther out first: chains of such parts.
+    order.sort_by_key(|&p| std::cmp::Reverse(tree.ancestry(p).len()));
+    for part in order {
+        if let Some(carried) = tree.joints.iter().find(|j| j.parent == part).map(|j| parts[j.child].inertial) {
+            let (mass, inertia) = (0.01 * carried.mass, carried.inertia * 0.01);
+            parts[part].inertial = Inertial { mass, inertia, ..carried };
+        }
+    }
 }
 
 /// A joint that the surfaces leave less than this share of its range is not stopped by them: they
