@@ -12,7 +12,7 @@ use hingecast_capture::object::{ArticulatedObject, PartGeometry};
 use hingecast_capture::synth::{UsefulRange, useful_ranges};
 use hingecast_geom::folder::{may_be_emptied, may_become};
 use hingecast_geom::{JointKind, KinematicTree, Progress, TriMesh};
-use hingecast_twin::hulls::{HullConfig, decompose};
+use hingecast_twin::hulls::{HullConfig, convex, decompose};
 use hingecast_twin::link::touching;
 use hingecast_twin::separate::separate;
 use hingecast_twin::{Inertial, PartModel, Twin, mass};
@@ -27,6 +27,8 @@ const DETAIL: f32 = 0.35;
 /// Shells smaller than this share of the object's diagonal (screws, letters) collide with nothing
 /// that matters.
 const CRUMB: f64 = 0.01;
+/// The most convex shells of a part that are pieces as they are.
+const MOST_CONVEX: usize = 64;
 /// The most details of a part that get pieces of their own, largest first.
 const MOST_DETAILS: usize = 24;
 
@@ -277,10 +279,21 @@ fn collision(mesh: &TriMesh, diagonal: f64) -> Vec<TriMesh> {
     let Some((lo, hi)) = mesh.bounds() else { return Vec::new() };
     let part = (hi - lo).length();
     let size = |shell: &TriMesh| shell.bounds().map_or(0.0, |(lo, hi)| (hi - lo).length());
-    let (mut details, rest): (Vec<TriMesh>, Vec<TriMesh>) = shells(mesh)
-        .into_iter()
-        .filter(|s| f64::from(size(s)) > CRUMB * diagonal)
-        .partition(|s| size(s) < DETAIL * part);
+    let mut all: Vec<TriMesh> = shells(mesh).into_iter().filter(|s| f64::from(size(s)) > CRUMB * diagonal).collect();
+    all.sort_by(|a, b| size(b).total_cmp(&size(a)));
+    // What is convex already is one piece each, the largest first.
+    let mut hulls = Vec::new();
+    all.retain(|shell| match convex(shell).filter(|_| hulls.len() < MOST_CONVEX) {
+        Some(hull) => {
+            hulls.push(hull);
+            false
+        }
+        None => true,
+    });
+    if all.is_empty() {
+        return hulls;
+    }
+    let (mut details, rest): (Vec<TriMesh>, Vec<TriMesh>) = all.into_iter().partition(|s| size(s) < DETAIL * part);
     details.sort_by(|a, b| size(b).total_cmp(&size(a)));
     let mut body = TriMesh::default();
     let spare = details.split_off(details.len().min(MOST_DETAILS));
@@ -289,7 +302,7 @@ fn collision(mesh: &TriMesh, diagonal: f64) -> Vec<TriMesh> {
     for shell in rest.iter().chain(&spare).chain(details.iter().filter(|_| all_small)) {
         body.append(shell);
     }
-    let (mut hulls, _) = decompose(&body, &HullConfig::default());
+    hulls.extend(decompose(&body, &HullConfig::default()).0);
     if !all_small {
         let fine = HullConfig { resolution: 64, concavity: 0.005, max_hulls: 8 };
         hulls.extend(details.iter().flat_map(|d| decompose(d, &fine).0));
@@ -336,6 +349,13 @@ fn shells(mesh: &TriMesh) -> Vec<TriMesh> {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn boxes_are_a_piece_each() {
+        let mut shelf = TriMesh::cuboid(Vec3::ZERO, Vec3::new(1.0, 0.3, 0.02));
+        shelf.append(&TriMesh::cuboid(Vec3::new(0.0, 0.0, 0.02), Vec3::new(0.02, 0.3, 0.9)));
+        assert_eq!(collision(&shelf, 1.4).iter().map(|h| h.vertices.len()).collect::<Vec<_>>(), [8, 8]);
+    }
 
     #[test]
     fn a_knob_on_a_door_gets_a_piece_of_its_own() {

@@ -32,6 +32,9 @@ pub fn decompose(mesh: &TriMesh, config: &HullConfig) -> (Vec<TriMesh>, usize) {
     if mesh.is_empty() {
         return (Vec::new(), 0);
     }
+    if let Some(whole) = convex(mesh) {
+        return (vec![whole], 0);
+    }
     let points: Vec<Vector> = mesh.vertices.iter().map(|v| Vector::new(v.x, v.y, v.z)).collect();
     // On some surfaces parry's own hulls of voxels fail, and it panics. A slightly other grid of
     // voxels does then; the hull of the whole always does.
@@ -63,6 +66,26 @@ pub fn decompose(mesh: &TriMesh, config: &HullConfig) -> (Vec<TriMesh>, usize) {
         .collect();
     let dropped = total - hulls.len();
     (hulls, dropped)
+}
+
+/// Share of its hull's volume from which on a closed surface counts as convex.
+const CONVEX: f64 = 0.99;
+/// Corners that one piece may have; rounder things are better several pieces of few corners.
+const MOST_CORNERS: usize = 256;
+
+/// The hull of a closed surface that is convex already: a box is one piece, and no slices.
+pub fn convex(mesh: &TriMesh) -> Option<TriMesh> {
+    let volume = mesh.mass_integrals().volume;
+    if !(volume > 0.0) || mesh.open_edges() != 0 {
+        return None;
+    }
+    let points: Vec<Vector> = mesh.vertices.iter().map(|v| Vector::new(v.x, v.y, v.z)).collect();
+    let (vertices, faces) = try_convex_hull(&points).ok()?;
+    let vertices = vertices.into_iter().map(|p| Vec3::new(p.x, p.y, p.z)).collect();
+    let hull = TriMesh { vertices, faces, colors: Vec::new() };
+    let (lo, hi) = mesh.bounds()?;
+    let alike = volume >= CONVEX * hull.mass_integrals().volume;
+    (alike && hull.vertices.len() <= MOST_CORNERS && usable(&hull, 1e-3 * (hi - lo).length())).then_some(hull)
 }
 
 /// Grids of voxels that are tried before the part is taken as one piece.
@@ -99,6 +122,18 @@ pub fn usable(hull: &TriMesh, thinnest: f32) -> bool {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_box_is_one_piece_and_a_box_with_a_notch_is_not() {
+        let whole = TriMesh::cuboid(Vec3::ZERO, Vec3::new(0.1, 0.1, 0.1));
+        let (pieces, dropped) = decompose(&whole, &HullConfig::default());
+        assert_eq!((pieces.len(), dropped, pieces[0].vertices.len()), (1, 0, 8));
+        assert!((pieces[0].mass_integrals().volume - 1e-3).abs() < 1e-9);
+        assert!(convex(&drawer()).is_none());
+        let mut open = whole.clone();
+        open.faces.pop();
+        assert!(convex(&open).is_none(), "a sheet encloses nothing");
+    }
 
     #[test]
     fn a_panic_of_the_decomposition_is_no_panic_of_ours() {

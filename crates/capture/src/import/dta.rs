@@ -35,6 +35,8 @@ pub(super) fn read(src: &Path) -> Result<Vec<Shot>, CaptureError> {
             depth_scale: 1e-3,
             depth_least: 0.0,
             mask: mask.map_or(MaskFrom::Alpha, MaskFrom::File),
+            occluder: None,
+            occluded: false,
             time: None,
         });
     }

@@ -36,6 +36,8 @@ pub(super) fn read(src: &Path) -> Result<Vec<Shot>, CaptureError> {
                     depth_scale: 1e-3,
                     depth_least: 0.0,
                     mask: if seg.is_file() { MaskFrom::File(seg) } else { MaskFrom::Alpha },
+                    occluder: None,
+                    occluded: false,
                     time: Some(t as f64),
                 });
             }

@@ -14,6 +14,7 @@ mod screwsplat;
 mod store;
 
 use crate::{CaptureError, Split};
+use glam::DVec3;
 use hingecast_geom::{Camera, Progress};
 use lens::Lens;
 use serde::{Deserialize, Serialize};
@@ -97,7 +98,27 @@ pub(crate) struct Shot {
     pub depth_scale: f64,
     pub depth_least: f64,
     pub mask: MaskFrom,
+    /// Pixels that a hand hides.
+    pub occluder: Option<PathBuf>,
+    /// The person hides the object.
+    pub occluded: bool,
     pub time: Option<f64>,
+}
+
+/// All pictures of a source, and what it says about its world.
+pub(crate) struct Source {
+    pub shots: Vec<Shot>,
+    /// Lengths are metres.
+    pub metric: bool,
+    /// Unit vector.
+    pub up: DVec3,
+}
+
+impl From<Vec<Shot>> for Source {
+    /// Layouts that say nothing of scale and up.
+    fn from(shots: Vec<Shot>) -> Self {
+        Self { shots, metric: false, up: DVec3::Z }
+    }
 }
 
 /// Where the object's mask comes from.
@@ -114,15 +135,15 @@ pub(crate) enum MaskFrom {
 /// When the layout is not recognised, or a file of it is missing or broken.
 pub fn import(src: &Path, out: &Path, format: Format, progress: &Progress) -> Result<ImportReport, CaptureError> {
     let format = if format == Format::Auto { detect(src)? } else { format };
-    let shots = match format {
+    let source: Source = match format {
         Format::Auto | Format::Nerfstudio => nerfstudio::read(src)?,
-        Format::Artgs => artgs::read(src)?,
-        Format::Dta => dta::read(src)?,
-        Format::Paris => paris::read(src)?,
-        Format::Screwsplat => screwsplat::read(src)?,
-        Format::Dynamic3dgs => dynamic3dgs::read(src)?,
+        Format::Artgs => artgs::read(src)?.into(),
+        Format::Dta => dta::read(src)?.into(),
+        Format::Paris => paris::read(src)?.into(),
+        Format::Screwsplat => screwsplat::read(src)?.into(),
+        Format::Dynamic3dgs => dynamic3dgs::read(src)?.into(),
     };
-    if !shots.iter().any(|s| s.split == Split::Train) {
+    if !source.shots.iter().any(|s| s.split == Split::Train) {
         let hint = "check that the folder is complete, or name another --format";
         return Err(CaptureError::new(
             format!("no training pictures were found for the layout {}", format.name()),
@@ -131,7 +152,7 @@ pub fn import(src: &Path, out: &Path, format: Format, progress: &Progress) -> Re
         ));
     }
     let name = src.file_name().map(|n| n.to_string_lossy().into_owned()).unwrap_or_else(|| "recording".into());
-    let recording = store::store(&shots, &name, out, progress)?;
+    let recording = store::store(&source, &name, out, progress)?;
     Ok(ImportReport {
         recording: recording.root.clone(),
         format,

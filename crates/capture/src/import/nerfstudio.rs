@@ -2,18 +2,21 @@
 //! frames with our `state` or a `time` of a few values. `applied_transform` is in the poses
 //! already.
 
-use super::{Lens, MaskFrom, Shot, numbers, subfolders};
+use super::{Lens, MaskFrom, Shot, Source, numbers, subfolders};
 use crate::CaptureError;
 use crate::recording::camera_from_gl;
 use crate::recording::transforms::{self, DefaultState, Document};
+use glam::DVec3;
 use hingecast_geom::Camera;
 use std::collections::BTreeMap;
 use std::path::Path;
 
-/// More different times than this are a film, not states.
-const MOST_STATES: usize = 200;
+/// More different times than this are a film, not states: no method takes more states.
+const MOST_STATES: usize = 64;
+/// With fewer pictures a time than this, the times are those of a film, too.
+const LEAST_VIEWS: usize = 3;
 
-pub(super) fn read(src: &Path) -> Result<Vec<Shot>, CaptureError> {
+pub(super) fn read(src: &Path) -> Result<Source, CaptureError> {
     let single = if src.is_file() { src.to_path_buf() } else { src.join("transforms.json") };
     let documents: Vec<Document> = if single.is_file() {
         vec![transforms::parse(src, &single, DefaultState::Is(0))?]
@@ -27,7 +30,7 @@ pub(super) fn read(src: &Path) -> Result<Vec<Shot>, CaptureError> {
             return Err(problem.error.clone());
         }
         let says_state = d.value["frames"].as_array().is_some_and(|f| f.iter().any(|f| f.get("state").is_some()));
-        let times = if says_state || documents.len() > 1 { BTreeMap::new() } else { states_by_time(d) };
+        let times = if says_state || documents.len() > 1 { BTreeMap::new() } else { states_by_time(d)? };
         for e in &d.entries {
             let i = &e.intrinsics;
             let camera_from_world = camera_from_gl(&e.world_from_camera, &e.place)?;
@@ -43,21 +46,32 @@ pub(super) fn read(src: &Path) -> Result<Vec<Shot>, CaptureError> {
                 depth_scale: e.depth_scale,
                 depth_least: 0.0,
                 mask: e.mask.clone().map_or(MaskFrom::Alpha, MaskFrom::File),
+                occluder: e.occluder_mask.clone(),
+                occluded: e.occluded,
                 time: e.time,
             });
         }
     }
-    Ok(shots)
+    let metric = documents.iter().any(|d| d.metric);
+    Ok(Source { shots, metric, up: documents.first().map_or(DVec3::Z, |d| d.up) })
 }
 
 /// States in the order of time, when there are few times. Keys are bit patterns: times >= 0 sort
 /// like their bits.
-fn states_by_time(d: &Document) -> BTreeMap<u64, usize> {
+///
+/// # Errors
+/// When every picture has its own time, or nearly so: a film, in which nobody says what stood still.
+fn states_by_time(d: &Document) -> Result<BTreeMap<u64, usize>, CaptureError> {
     let mut times: Vec<f64> = d.entries.iter().filter_map(|e| e.time).collect();
     times.sort_by(f64::total_cmp);
     times.dedup();
-    if times.len() > MOST_STATES {
-        return BTreeMap::new();
+    let pictures = d.entries.iter().filter(|e| e.time.is_some()).count();
+    if times.len() > MOST_STATES || times.len() > 1 && pictures < LEAST_VIEWS * times.len() {
+        return Err(CaptureError::new(
+            format!("{pictures} pictures with {} times are a film, not states", times.len()),
+            format!("{}: frames[].time", d.file.display()),
+            "say which picture shows which joint configuration: a \"state\" a frame, or a folder a state",
+        ));
     }
-    times.into_iter().enumerate().map(|(s, t)| (t.to_bits(), s)).collect()
+    Ok(times.into_iter().enumerate().map(|(s, t)| (t.to_bits(), s)).collect())
 }

@@ -1,17 +1,18 @@
 //! Decodes the pictures of a source, undistorts them, and writes the native recording.
 
-use super::{MaskFrom, Shot};
-use crate::recording::images;
+use super::{MaskFrom, Shot, Source};
+use crate::recording::{images, mask};
 use crate::synth::Staging;
 use crate::{CaptureError, Frame, Recording, Split};
-use glam::{DVec2, DVec3};
+use glam::DVec2;
 use hingecast_geom::{Camera, Progress};
 use rayon::prelude::*;
 use std::collections::BTreeMap;
 use std::path::Path;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
-pub(super) fn store(shots: &[Shot], name: &str, out: &Path, progress: &Progress) -> Result<Recording, CaptureError> {
+pub(super) fn store(source: &Source, name: &str, out: &Path, progress: &Progress) -> Result<Recording, CaptureError> {
+    let shots = &source.shots;
     let out = std::path::absolute(out).map_err(|e| CaptureError::write(out, e))?;
     let work = Staging::new(&out)?;
     for folder in ["rgb", "depth", "mask", "occluder"] {
@@ -43,8 +44,8 @@ pub(super) fn store(shots: &[Shot], name: &str, out: &Path, progress: &Progress)
         name: name.to_string(),
         frames,
         n_states: train_states,
-        metric: false,
-        up: DVec3::Z,
+        metric: source.metric,
+        up: source.up,
     };
     recording.write()?;
     // Folders that this source did not need; those with files refuse to go.
@@ -78,8 +79,9 @@ fn one(shot: &Shot, view: usize, root: &Path) -> Result<Frame, CaptureError> {
         MaskFrom::Alpha => None,
     };
     let depth = shot.depth.as_ref().map(|path| depth_file(shot, path, w, h)).transpose()?;
-    let picture = Picture { rgba, mask, depth };
-    let (picture, seen) = if shot.lens.is_ideal() { (picture, None) } else { undistorted(shot, &camera, picture) };
+    let hidden = shot.occluder.as_ref().map(|path| mask_file(path, w, h)).transpose()?;
+    let picture = Picture { rgba, mask, depth, hidden };
+    let picture = if shot.lens.is_ideal() { picture } else { undistorted(shot, &camera, picture) };
 
     let name = format!("s{:03}_v{view:03}.png", shot.state);
     let file = |folder: &str| root.join(folder).join(&name);
@@ -88,8 +90,8 @@ fn one(shot: &Shot, view: usize, root: &Path) -> Result<Frame, CaptureError> {
     if let Some(mask) = &picture.mask {
         images::write_gray(&file("mask"), mask, w, h)?;
     }
-    if let Some(unseen) = &seen {
-        images::write_gray(&file("occluder"), unseen, w, h)?;
+    if let Some(hidden) = &picture.hidden {
+        images::write_gray(&file("occluder"), hidden, w, h)?;
     }
     let mut depth_scale = shot.depth_scale;
     if let Some(depth) = &picture.depth {
@@ -106,8 +108,8 @@ fn one(shot: &Shot, view: usize, root: &Path) -> Result<Frame, CaptureError> {
         depth: picture.depth.as_ref().map(|_| file("depth")),
         depth_scale,
         mask: picture.mask.as_ref().map(|_| file("mask")),
-        occluded: false,
-        occluder_mask: seen.map(|_| file("occluder")),
+        occluded: shot.occluded,
+        occluder_mask: picture.hidden.as_ref().map(|_| file("occluder")),
         time: shot.time,
     })
 }
@@ -118,17 +120,14 @@ struct Picture {
     mask: Option<Vec<u8>>,
     /// Scene units, 0 = unknown.
     depth: Option<Vec<f64>>,
+    /// 255 where a hand hides the object, or the lens saw nothing.
+    hidden: Option<Vec<u8>>,
 }
 
-/// First channel above 0; resized by nearest pixel when it has another size than the colour.
+/// 0 or 255; resized by nearest pixel when it has another size than the colour.
 fn mask_file(path: &Path, w: usize, h: usize) -> Result<Vec<u8>, CaptureError> {
-    let image = images::read(path)?.into_rgba8();
-    let (mw, mh) = (image.width() as usize, image.height() as usize);
-    let raw = image.into_raw();
-    // Masks that stand in the alpha of an otherwise white image.
-    let only_alpha = raw.chunks_exact(4).all(|p| p[0] == 255) && raw.chunks_exact(4).any(|p| p[3] < 128);
-    let channel = if only_alpha { 3 } else { 0 };
-    Ok(nearest(mw, mh, w, h).map(|i| if raw[4 * i + channel] > 0 { 255 } else { 0 }).collect())
+    let (mask, mw, mh) = mask::read(path)?;
+    Ok(nearest(mw, mh, w, h).map(|i| 255 * mask[i]).collect())
 }
 
 fn depth_file(shot: &Shot, path: &Path, w: usize, h: usize) -> Result<Vec<f64>, CaptureError> {
@@ -158,9 +157,9 @@ fn fine_scale(depth: &[f64], own: f64) -> f64 {
     scale
 }
 
-/// The picture of the ideal pinhole camera: colour bilinear, mask and depth nearest. Second: 255
-/// where the distorted picture did not reach, if anywhere.
-fn undistorted(shot: &Shot, camera: &Camera, from: Picture) -> (Picture, Option<Vec<u8>>) {
+/// The picture of the ideal pinhole camera: colour bilinear, the others nearest. Hidden is also
+/// where the distorted picture did not reach.
+fn undistorted(shot: &Shot, camera: &Camera, from: Picture) -> Picture {
     let (w, h) = (camera.width, camera.height);
     let n = w * h;
     let mut rgba = vec![255u8; 4 * n];
@@ -176,6 +175,9 @@ fn undistorted(shot: &Shot, camera: &Camera, from: Picture) -> (Picture, Option<
             continue;
         }
         let pixel = y as usize * w + x as usize;
+        if let Some(from) = &from.hidden {
+            unseen[i] = from[pixel];
+        }
         if let (Some(to), Some(from)) = (&mut mask, &from.mask) {
             to[i] = from[pixel];
         }
@@ -196,8 +198,8 @@ fn undistorted(shot: &Shot, camera: &Camera, from: Picture) -> (Picture, Option<
             rgba[4 * i + c] = (top * (1.0 - ty) + bottom * ty).round() as u8;
         }
     }
-    let unseen = unseen.contains(&255).then_some(unseen);
-    (Picture { rgba, mask, depth }, unseen)
+    let hidden = (from.hidden.is_some() || unseen.contains(&255)).then_some(unseen);
+    Picture { rgba, mask, depth, hidden }
 }
 
 fn over_white(p: &[u8]) -> [u8; 3] {

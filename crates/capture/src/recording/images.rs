@@ -109,7 +109,30 @@ pub fn read_npy(path: &Path) -> Result<(Vec<f64>, Vec<usize>), CaptureError> {
         )*};
     }
     attempt!(f32, f64, u16, u8, i16, i32, u32, i64, u64);
+    let descr = header.dtype().descr();
+    if let Some(order) = descr.trim_matches('\'').strip_suffix("f2") {
+        let numbers = shape.iter().try_fold(1usize, |n, k| n.checked_mul(*k)).and_then(|n| n.checked_mul(2));
+        let start = numbers.and_then(|n| bytes.len().checked_sub(n));
+        let pairs = start.map_or(&[][..], |start| bytes[start..].as_chunks::<2>().0);
+        // What stands before the numbers is at least the shortest header.
+        if start.is_some_and(|start| start > 10) {
+            let bits = |p: &[u8; 2]| if order == ">" { u16::from_be_bytes(*p) } else { u16::from_le_bytes(*p) };
+            return Ok((pairs.iter().map(|p| from_half(bits(p))).collect(), shape));
+        }
+    }
     Err(bad(&format!("its type is {}", header.dtype().descr())))
+}
+
+/// IEEE 754's 16 bits: sign, 5 of exponent, 10 of fraction.
+fn from_half(bits: u16) -> f64 {
+    let fraction = f64::from(bits & 0x3ff) / 1024.0;
+    let value = match bits >> 10 & 0x1f {
+        0 => fraction * 2f64.powi(-14),
+        31 if bits & 0x3ff == 0 => f64::INFINITY,
+        31 => f64::NAN,
+        exponent => (1.0 + fraction) * 2f64.powi(i32::from(exponent) - 15),
+    };
+    if bits >> 15 == 1 { -value } else { value }
 }
 
 /// Grey 8-bit PNG, fast compression.
@@ -182,6 +205,26 @@ mod tests {
         out.extend(text.bytes());
         out.extend(std::iter::repeat_n(1f32.to_le_bytes(), numbers).flatten());
         out
+    }
+
+    #[test]
+    fn half_precision_is_read() {
+        for (bits, value) in
+            [(0x3c00, 1.0), (0xc000, -2.0), (0x3555, 0.333_251_953_125), (0x0001, 2f64.powi(-24)), (0x7bff, 65504.0)]
+        {
+            assert_eq!(from_half(bits), value);
+        }
+        let dir = tempfile::tempdir().unwrap();
+        let file = dir.path().join("depth.npy");
+        let text = "{'descr': '<f2', 'fortran_order': False, 'shape': (2, 3), }\n";
+        let mut bytes = b"\x93NUMPY\x01\x00".to_vec();
+        bytes.extend((text.len() as u16).to_le_bytes());
+        bytes.extend(text.bytes());
+        bytes.extend([0x3c00u16, 0x4000, 0x4200, 0x4400, 0, 0x3800].iter().flat_map(|b| b.to_le_bytes()));
+        std::fs::write(&file, &bytes).unwrap();
+        assert_eq!(read_depth(&file).unwrap(), (vec![1.0, 2.0, 3.0, 4.0, 0.0, 0.5], 3, 2));
+        std::fs::write(&file, &bytes[..bytes.len() - 70]).unwrap();
+        assert!(read_depth(&file).is_err());
     }
 
     #[test]

@@ -10,6 +10,7 @@ mod cache;
 mod fields;
 mod fingerprint;
 pub mod images;
+pub(crate) mod mask;
 mod packed_depth;
 mod stray;
 pub(crate) mod transforms;
@@ -169,6 +170,13 @@ fn frame(entry: &Entry, default_view: usize) -> Result<Frame, CaptureError> {
             "give the focal length in pixels, about the image width for a phone",
         ));
     }
+    if i.width == 0 || i.height == 0 {
+        return Err(CaptureError::new(
+            "the image size is zero",
+            place("w, h", format!("{}, {}", i.width, i.height)),
+            "give the size of the colour image in pixels",
+        ));
+    }
     let far = |c: f64, size: usize| !((c - 0.5 * size as f64).abs() <= FARTHEST_MIDDLE * size as f64);
     if [i.fx, i.fy].iter().any(|f| !(NARROWEST..WIDEST).contains(&(f / i.width.max(1) as f64))) {
         return Err(CaptureError::new(
@@ -182,13 +190,6 @@ fn frame(entry: &Entry, default_view: usize) -> Result<Frame, CaptureError> {
             "the principal point is absurd",
             place("cx, cy", format!("{}, {} for {} x {} pixels", i.cx, i.cy, i.width, i.height)),
             "give cx and cy in pixels of these images, about half of w and h",
-        ));
-    }
-    if i.width == 0 || i.height == 0 {
-        return Err(CaptureError::new(
-            "the image size is zero",
-            place("w, h", format!("{}, {}", i.width, i.height)),
-            "give the size of the colour image in pixels",
         ));
     }
     let camera_from_world = camera_from_gl(&entry.world_from_camera, &entry.place)?;

@@ -260,7 +260,15 @@ fn intrinsics(f: &Fields, color: &Path) -> Result<Intrinsics, CaptureError> {
     }
     let model = f.text("camera_model")?.unwrap_or("OPENCV");
     let fisheye = model == "OPENCV_FISHEYE";
-    if !matches!(model, "OPENCV" | "PINHOLE" | "SIMPLE_PINHOLE" | "pinhole" | "perspective" | "OPENCV_FISHEYE") {
+    match model {
+        // COLMAP's models with one and two radial terms: what else the file holds is not theirs.
+        "SIMPLE_RADIAL" => distortion[1..].fill(0.0),
+        "RADIAL" => distortion[2..].fill(0.0),
+        _ => {}
+    }
+    let known =
+        ["OPENCV", "PINHOLE", "SIMPLE_PINHOLE", "SIMPLE_RADIAL", "RADIAL", "pinhole", "perspective", "OPENCV_FISHEYE"];
+    if !known.contains(&model) {
         let wrong = f.wrong("camera_model", &Value::String(model.into()), "PINHOLE or OPENCV");
         return Err(CaptureError { what: format!("the camera model {model} is unknown"), ..wrong });
     }
@@ -270,7 +278,11 @@ fn intrinsics(f: &Fields, color: &Path) -> Result<Intrinsics, CaptureError> {
 
 /// Absolute path; the older NeRF layout leaves ".png" away.
 fn resolve(folder: &Path, name: &str) -> PathBuf {
-    let path = folder.join(name.strip_prefix("./").unwrap_or(name));
+    let mut path = folder.join(name.strip_prefix("./").unwrap_or(name));
+    // Written on Windows, unless a file is really called so.
+    if name.contains('\\') && !path.exists() {
+        path = folder.join(normal_name(&name.replace('\\', "/")));
+    }
     if path.extension().is_none() { path.with_extension("png") } else { path }
 }
 

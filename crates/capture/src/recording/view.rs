@@ -73,14 +73,11 @@ fn over_white(rgba: &[u8]) -> (Vec<u8>, Vec<u8>) {
     (rgb, rgba.chunks_exact(4).map(|p| u8::from(p[3] > 127)).collect())
 }
 
-/// A mask image as 0 and 1. Non-zero is 1: masks come as 0/1 and as 0/255.
+/// A mask image as 0 and 1.
 pub(crate) fn binary(path: &Path, w: usize, h: usize) -> Result<Vec<u8>, CaptureError> {
-    let image = images::read(path)?;
-    same_size(path, (image.width() as usize, image.height() as usize), (w, h))?;
-    let grey = image.into_luma8().into_raw();
-    // Lossy masks (JPEG) ring around the edge: half of their own maximum is the threshold.
-    let threshold = grey.iter().max().copied().unwrap_or(0) / 2;
-    Ok(grey.into_iter().map(|g| u8::from(g > threshold)).collect())
+    let (mask, mw, mh) = super::mask::read(path)?;
+    same_size(path, (mw, mh), (w, h))?;
+    Ok(mask)
 }
 
 fn same_size(path: &Path, found: (usize, usize), expected: (usize, usize)) -> Result<(), CaptureError> {
