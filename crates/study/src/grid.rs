@@ -22,39 +22,45 @@ const PROTOCOLS: [(&str, usize, usize, Noise); 6] = [
     ("2x100-d435", 2, 100, Noise::D435),
 ];
 
-/// One cell of the grid.
+/// One cell of the grid: one recording of one object.
 #[derive(serde::Serialize)]
 pub struct Row {
-    /// Name of the protocol.
+    /// Name of the protocol, such as `25x60-d435`: states x views, and the camera's noise.
     pub protocol: String,
     /// Seed of the recording.
     pub seed: u64,
-    /// How far off the joints are.
+    /// Which parts and joints were found, and how far off they are; its fields stand beside these
+    /// two in the JSON.
     #[serde(flatten)]
     pub evaluation: PartsEvaluation,
 }
 
 /// What a grid is asked for.
 pub struct Request<'a> {
+    /// Objects, as [`crate::suite::objects`] answers them.
     pub suite: &'a [Named],
-    /// Names of protocols; all if empty.
+    /// Names of protocols; all if empty. A name that does not exist is passed over beside one that
+    /// does.
     pub protocols: &'a [String],
     /// Number of seeds, from `first_seed` on.
     pub seeds: u64,
+    /// Seed of the first recording of each object; the next have the numbers after it.
     pub first_seed: u64,
-    /// Recordings, but for what the protocol says: states, views, noise, seed.
+    /// Recordings, but for what the protocol says: states, views, noise, seed, no test views.
     pub synth: &'a SynthConfig,
+    /// Settings of the search for parts; its method must be `screw`.
     pub build: &'a Config,
-    /// Folder that recordings and runs go to.
+    /// Recordings and runs go to `joints/PROTOCOL/seedN` in this folder.
     pub out: &'a Path,
     /// Remove each recording when its run is evaluated.
     pub tidy: bool,
 }
 
-/// Runs the grid; answers its cells and the table in Markdown.
+/// Runs the grid; answers its cells and the table in Markdown, one line a protocol. A recording
+/// that is there with the same settings is used again.
 ///
 /// # Errors
-/// A protocol that does not exist; the wish to stop. An object that fails is told and left out.
+/// None of the named protocols exists; the wish to stop. An object that fails is told and left out.
 pub fn run(host: &Host, request: &Request) -> Result<(Vec<Row>, String)> {
     let asked = |name: &str| request.protocols.is_empty() || request.protocols.iter().any(|n| n == name);
     let wanted: Vec<_> = PROTOCOLS.iter().filter(|p| asked(p.0)).collect();

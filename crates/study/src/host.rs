@@ -8,13 +8,13 @@ use hingecast::watcher::Watcher;
 pub struct Host<'a> {
     /// Hears of steps and stages, and may wish to stop.
     pub watcher: &'a dyn Watcher,
-    /// Worker threads of builds.
+    /// Worker threads of builds; 0 = as many as the machine has cores. Results do not depend on it.
     pub threads: usize,
 }
 
 impl Host<'_> {
-    /// How builds run here.
-    pub fn options(&self) -> Options {
+    /// All stages that are missing, on this many threads.
+    pub(crate) fn options(&self) -> Options {
         Options { threads: self.threads, ..Options::default() }
     }
 }

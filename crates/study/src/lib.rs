@@ -2,6 +2,8 @@
 //! object and on its twins, whole experiments, and grids of recordings through the search for
 //! parts. Algorithms behind the verbs `demos`, `train`, `rollout`, `experiment` and `bench`.
 
+#![warn(missing_docs)]
+
 #[cfg(feature = "mujoco")]
 pub mod experiment;
 pub mod grid;

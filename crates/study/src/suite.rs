@@ -16,15 +16,22 @@ pub struct Named {
     pub name: String,
 }
 
-/// What the folders of an object are called: after its own folder or file, wherever that lies.
+/// What the folders of an object are called: after its own folder, or its file without the
+/// extension, wherever that lies; `object` where the path has no name of its own.
 pub fn name_of(argument: &str) -> String {
     let path = Path::new(argument);
     let own = if path.is_file() { path.file_stem() } else { path.file_name() };
     own.map_or_else(|| "object".to_string(), |n| n.to_string_lossy().into_owned())
 }
 
-/// Objects of the suites, each suite sorted. What is not there, or would share a folder with
-/// another, is noticed now and not after an hour.
+/// Objects of the suites, each suite sorted: `ours` (the samples), `real` (PartNet-Mobility, in
+/// `$HINGECAST_DATA`), `all` (both, or the samples alone without that variable), else the name or
+/// path of one object. What is not there, or would share a folder with another, is noticed now and
+/// not after an hour.
+///
+/// # Errors
+/// An object or the samples that are nowhere, `real` without `HINGECAST_DATA`, two objects of one
+/// name.
 pub fn objects(suite: &[String]) -> Result<Vec<Named>> {
     let mut objects: Vec<Named> = Vec::new();
     for argument in arguments(suite)? {
@@ -91,7 +98,11 @@ pub fn record(host: &Host, object: &str, config: &SynthConfig, out: &Path) -> Re
     Ok(report)
 }
 
-/// Records, unless the same object lies there recorded with the same settings.
+/// Records, unless a recording with the same settings lies there. The settings are noted beside it,
+/// in `RECORDING.synth.json`; that it is the same object, the caller's folders must tell.
+///
+/// # Errors
+/// Those of [`record`]; a note that cannot be removed or written.
 pub fn record_once(host: &Host, argument: &str, config: &SynthConfig, recording: &Path) -> Result<()> {
     let note = note_of(recording);
     let settings = serde_json::to_value(config).expect("plain data");
@@ -107,8 +118,9 @@ pub fn record_once(host: &Host, argument: &str, config: &SynthConfig, recording:
     write_json(&note, &settings)
 }
 
-/// Deletes what [`record_once`] recorded. A folder without its note, or one that holds anything
-/// else, stays: a recording may have been refused just because of what lies there.
+/// Deletes what [`record_once`] recorded, and tells the watcher where it cannot. A folder without
+/// its note, or one that holds anything else, stays: a recording may have been refused just because
+/// of what lies there.
 pub fn tidy(host: &Host, recording: &Path) {
     let note = note_of(recording);
     if !note.is_file() || !recording.is_dir() {

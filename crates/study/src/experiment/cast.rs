@@ -56,17 +56,31 @@ type Maybe<T> = std::result::Result<T, String>;
 
 /// One object.
 pub struct Cast<'a> {
+    /// Builds and simulations run here.
     pub host: Host<'a>,
+    /// What shall be done, the same for every object.
     pub plan: &'a Plan,
-    /// As on the command line, and as in the table.
+    /// As on the command line: a name, or a path.
     pub argument: &'a str,
+    /// As in the table; also its folder among the plan's recordings and runs.
     pub name: &'a str,
+    /// Folder of this object, there already: all that is made goes into it.
     pub root: PathBuf,
+    /// Knows what is finished in `root`.
     pub steps: Steps<'a>,
+    /// Empty at first; [`Cast::rows`] adds to it what was demonstrated.
     pub demonstrated: Vec<Demonstrated>,
 }
 
 impl Cast<'_> {
+    /// Does what is not done yet; answers a row of the true object and one of each world of the
+    /// plan.
+    ///
+    /// # Errors
+    /// The wish to stop. Whatever else fails is a row that says why.
+    ///
+    /// # Panics
+    /// A plan without training seeds, or without episodes.
     pub fn rows(&mut self) -> Result<Vec<Row>> {
         let plan = self.plan;
         let truth = self.object();

@@ -37,7 +37,7 @@ pub enum World {
 impl World {
     /// # Errors
     /// When it is none of them.
-    pub fn read(text: &str) -> Result<Self> {
+    pub(crate) fn read(text: &str) -> Result<Self> {
         Ok(match text {
             "twin" => Self::Twin,
             "track" => Self::Track,
@@ -65,7 +65,7 @@ pub struct TwinError {
 }
 
 impl TwinError {
-    pub fn between(truth: &SpotPath, this: &SpotPath) -> Self {
+    pub(crate) fn between(truth: &SpotPath, this: &SpotPath) -> Self {
         let foot = truth.screw.foot(truth.spot);
         let hinges = truth.screw.kind.turns() && this.screw.kind.turns();
         Self {
@@ -79,35 +79,45 @@ impl TwinError {
 /// One way to count successes, over all training seeds.
 #[derive(Clone, Debug, Serialize)]
 pub struct Count {
+    /// Episodes that count, of all training seeds together.
     pub successes: usize,
-    /// Wilson's 95 % interval. It takes all episodes as independent; `per_seed` shows how far
-    /// training seeds differ.
+    /// Wilson's 95 % interval of the rate, 0 to 1. It takes all episodes as independent; `per_seed`
+    /// shows how far training seeds differ.
     pub interval: [f64; 2],
-    /// The true object's rate minus this one's, same policies and episodes.
+    /// The true object's rate minus this one's, same policies and episodes. `None` for the true
+    /// object itself and for `back`, whose policies are others.
     pub against_true: Option<Comparison>,
+    /// Episodes that count of each training seed's policy.
     pub per_seed: Vec<usize>,
 }
 
 /// One line of the table.
 #[derive(Clone, Debug, Serialize)]
 pub struct Row {
+    /// Name of the object, as its folder has it.
     pub object: String,
     /// "true", "twin", "track", "axis=30", ..., "back".
     pub world: String,
-    /// Why there are no figures.
+    /// Why there are no figures; `None` when there are.
     pub failed: Option<String>,
+    /// How wrong the joint is that the policies met. `None` for `back`, where they met the true
+    /// one, and without figures.
     pub error: Option<TwinError>,
+    /// Of all training seeds together; 0 without figures.
     pub episodes: usize,
+    /// The joint moved as far as the task asks. `None` without figures.
     pub success: Option<Count>,
+    /// The part ended where the true joint would have it. `None` without figures.
     pub as_true: Option<Count>,
-    /// Median distance of the spot from the true way at the end, mm.
+    /// Median distance of the spot from the true way at the end, simulated mm. `None` without
+    /// figures, and when every simulation diverged.
     pub median_off_mm: Option<f64>,
-    /// How the episodes ended.
+    /// How many episodes ended how; what never came up is left out.
     pub outcomes: BTreeMap<Outcome, usize>,
 }
 
 impl Row {
-    pub fn failed(object: &str, world: &str, why: impl Into<String>) -> Self {
+    pub(crate) fn failed(object: &str, world: &str, why: impl Into<String>) -> Self {
         Self { failed: Some(why.into()), ..Self::empty(object, world) }
     }
 
@@ -127,7 +137,7 @@ impl Row {
 
     /// `episodes[k]`: those of the policy of training seed k. `truth`: the same policies on the
     /// true object, at least as many episodes.
-    pub fn measured(
+    pub(crate) fn measured(
         object: &str,
         world: &str,
         error: Option<TwinError>,
@@ -168,22 +178,28 @@ impl Row {
 /// What was demonstrated on an object (or its twin), and how well that went.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct Demonstrated {
+    /// Name of the object, as its folder has it.
     pub object: String,
     /// "true" or "twin".
     pub on: String,
+    /// Name of the joint that was opened, in that model's file.
     pub joint: String,
     /// Simulated metres per unit of the file.
     pub scale: f64,
+    /// Successful episodes, which the policies learn from.
     pub kept: usize,
+    /// How the other attempts ended, and how many did so.
     pub thrown_away: BTreeMap<Outcome, usize>,
 }
 
 /// `experiment.json`.
 #[derive(Clone, Debug, Serialize)]
 pub struct Experiment {
-    /// Every flag's value.
+    /// Every flag's value, from [`plan::Plan::settings`].
     pub settings: serde_json::Value,
+    /// One of each object that could be demonstrated on, and a second, on its twin, for `back`.
     pub demonstrated: Vec<Demonstrated>,
+    /// Of each object in turn: the true object first, then its other worlds.
     pub rows: Vec<Row>,
 }
 

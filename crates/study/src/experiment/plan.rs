@@ -17,25 +17,31 @@ const WORLDS: [&str; 11] =
 pub struct Plan {
     /// Name and meaning of every world besides the true object.
     pub worlds: Vec<(String, World)>,
+    /// How objects are recorded that have no recording yet.
     pub synth: SynthConfig,
+    /// How the twin is built.
     pub twin: Config,
+    /// How the twin of the classical method is built: [`Plan::classical`].
     pub track: Config,
     /// One of each training seed.
     pub training: Vec<TrainConfig>,
     /// Demonstrations of each object.
     pub demos: usize,
-    /// Episodes of each policy.
+    /// Episodes of each policy in each world.
     pub episodes: usize,
-    /// The same on spoiled objects.
+    /// The same on spoiled objects, at most `episodes`; `None`: as many.
     pub spoiled_episodes: Option<usize>,
-    /// Folder of recordings that are there already, one folder an object.
+    /// Folder of recordings that are there already, one folder an object. An object without one is
+    /// recorded; `None`: all are.
     pub recordings: Option<PathBuf>,
-    /// Folders of runs that are there already.
+    /// Folders of runs that are there already, one folder an object. An object without a finished
+    /// run of the method is built.
     pub runs: Vec<PathBuf>,
 }
 
 impl Plan {
-    /// The worlds by their names; the usual ones if there are none.
+    /// The worlds by their names, such as `twin`, `axis=30` or `pivot=10,edge`; the usual eleven if
+    /// there are none.
     ///
     /// # Errors
     /// A name that means nothing.
@@ -50,19 +56,19 @@ impl Plan {
         Config { method: Method::Track, ..twin.clone() }
     }
 
-    pub fn has(&self, world: &World) -> bool {
+    pub(crate) fn has(&self, world: &World) -> bool {
         self.worlds.iter().any(|(_, w)| w == world)
     }
 
-    pub fn needs_recording(&self) -> bool {
+    pub(crate) fn needs_recording(&self) -> bool {
         [World::Twin, World::Track, World::Back].iter().any(|w| self.has(w))
     }
 
-    pub fn needs_twin(&self) -> bool {
+    pub(crate) fn needs_twin(&self) -> bool {
         self.has(&World::Twin) || self.has(&World::Back)
     }
 
-    pub fn episodes_in(&self, world: &World) -> usize {
+    pub(crate) fn episodes_in(&self, world: &World) -> usize {
         let n = self.episodes;
         if matches!(world, World::Spoiled(_)) { self.spoiled_episodes.unwrap_or(n).min(n) } else { n }
     }
@@ -80,6 +86,7 @@ impl Plan {
         ])
     }
 
+    /// The whole plan as JSON, for `experiment.json`.
     pub fn settings(&self) -> serde_json::Value {
         let worlds: Vec<&String> = self.worlds.iter().map(|(name, _)| name).collect();
         serde_json::json!({

@@ -8,6 +8,9 @@ use plotters::prelude::*;
 /// Errors below this are drawn here: zero has no place on a logarithmic axis. Simulated mm.
 const LEAST: f64 = 0.01;
 
+/// SVG of two panels, success and as true (%), over [`TwinError::goal_mm`](super::TwinError), on a
+/// logarithmic axis; each point with its 95 % interval. The true object, `back` and rows without
+/// figures have no point.
 pub fn success_against_error(rows: &[Row]) -> String {
     svg((1180, 460), |area| {
         let panels = area.split_evenly((1, 2));

@@ -25,7 +25,8 @@ pub struct Ledger {
 }
 
 impl Ledger {
-    /// A file that cannot be read starts anew.
+    /// That of the object's folder; it must be there before a step finishes. A file that cannot be
+    /// read starts anew.
     pub fn open(folder: &Path) -> Self {
         let path = folder.join("steps.json");
         let done = read_json(&path).unwrap_or_default();
@@ -55,10 +56,12 @@ pub struct Clock {
 }
 
 impl Clock {
+    /// `planned`: from [`Plan::steps`](super::plan::Plan::steps); `objects`: how many there are.
     pub fn new(planned: BTreeMap<&'static str, usize>, objects: usize) -> Self {
         Self { planned, objects_left: objects, ..Self::default() }
     }
 
+    /// To be called before every object, the first included: all its steps are to come.
     pub fn next_object(&mut self) {
         self.objects_left = self.objects_left.saturating_sub(1);
         self.left = self.planned.clone();
@@ -72,7 +75,7 @@ impl Clock {
     }
 
     /// `None` while a kind of step that is to come has never run.
-    pub fn secs_left(&self) -> Option<f64> {
+    fn secs_left(&self) -> Option<f64> {
         let mut sum = 0.0;
         for (kind, planned) in &self.planned {
             let n = self.left.get(kind).copied().unwrap_or(0) + planned * self.objects_left;
@@ -87,9 +90,13 @@ impl Clock {
 
 /// Runs the steps of one object.
 pub struct Steps<'a> {
+    /// Hears of each step that is not skipped.
     pub watcher: &'a dyn Watcher,
+    /// Name of the object, for the watcher.
     pub object: &'a str,
+    /// What is finished of this object.
     pub ledger: Ledger,
+    /// That of the whole experiment, one object after the other.
     pub clock: &'a mut Clock,
 }
 
@@ -98,7 +105,7 @@ impl Steps<'_> {
     ///
     /// # Errors
     /// Those of `work`; it is tried again by the next run.
-    pub fn step(
+    pub(crate) fn step(
         &mut self,
         kind: &'static str,
         name: &str,

@@ -27,6 +27,8 @@ fn number(value: Option<f64>, digits: usize) -> String {
     value.map_or("-".into(), |v| format!("{v:.digits$}"))
 }
 
+/// Two tables: the rows, rates and differences in per cent with their 95 % intervals, and what was
+/// demonstrated. Of a row that failed it says why.
 pub fn markdown(experiment: &Experiment) -> String {
     let mut out = String::from(
         "| object | world | axis deg | pivot mm | goal mm | episodes | success % | true - this | as true % | true - this | off mm | ends |\n",
@@ -67,6 +69,9 @@ fn line(row: &Row) -> String {
     )
 }
 
+/// The rows with a header line. Rates, differences and intervals are shares, not per cent, lengths
+/// simulated mm; `success` and `as_true` are numbers of episodes. A cell is empty where there is no
+/// figure; a comma in a world's name is written as `+`.
 pub fn csv(experiment: &Experiment) -> String {
     let mut out = String::from("object,world,axis_deg,pivot_mm,goal_mm,episodes");
     for name in ["success", "as_true"] {

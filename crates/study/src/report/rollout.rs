@@ -19,10 +19,15 @@ const FAR_MM: f64 = 15.0;
 
 /// Everything that the page tells.
 pub struct RolloutReport<'a> {
+    /// Folder of the policy.
     pub policy: &'a Path,
+    /// What it was asked to do, in every world.
     pub task: &'a TaskSpec,
+    /// As for [`rollout`](crate::simulate::rollout::rollout).
     pub seed: u64,
+    /// How long all episodes took on the clock, s.
     pub secs: f64,
+    /// The first world is what the others are compared with.
     pub results: &'a [WorldResult],
 }
 
@@ -30,6 +35,9 @@ pub struct RolloutReport<'a> {
 ///
 /// # Errors
 /// When the folder cannot be written.
+///
+/// # Panics
+/// Several worlds with different numbers of episodes, or with none.
 pub fn write(report: &RolloutReport, folder: &Path) -> Result<PathBuf> {
     let path = folder.join("index.html");
     write_whole(&path, page(report).as_bytes()).map_err(Failure::io(&path))?;

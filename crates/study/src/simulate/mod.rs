@@ -13,11 +13,12 @@ use hingecast_capture::object::ArticulatedObject;
 use std::path::{Path, PathBuf};
 
 /// The model file behind `--object`: a path, or the name of a sample. A PartNet-Mobility folder is
-/// made fit for the simulator first, as `hingecast import-object` does it, in the folder `imported`.
-/// Without one it is refused.
+/// made fit for the simulator first, as `hingecast import-object` does it, in `imported`; `None`:
+/// such a folder is refused. Answers an absolute path, or `hinged_blocks` as it is: these blocks
+/// need no file.
 ///
 /// # Errors
-/// When nothing of that name is there, or it cannot be imported.
+/// When nothing of that name is there, or it must be imported and cannot be.
 pub fn object_file(host: &Host, argument: &str, imported: Option<&Path>) -> Result<PathBuf> {
     if argument == hingecast_sim::object::HINGED_BLOCKS {
         return Ok(PathBuf::from(argument));
@@ -42,7 +43,8 @@ pub fn imported_beside(demos: &Path) -> PathBuf {
     demos.with_extension("object")
 }
 
-/// The model file behind `--twin`: a run, its twin folder, or the file itself.
+/// The model file behind `--twin`: of a run, of its twin folder, or the file itself. An absolute
+/// path.
 ///
 /// # Errors
 /// When no twin is there.
@@ -55,7 +57,7 @@ fn absolute(path: &Path) -> Result<PathBuf> {
     path.canonicalize().map_err(Failure::io(path))
 }
 
-/// A folder that cannot be written is noticed before the work and not after it.
+/// A folder in which `file` cannot be written is noticed before the work and not after it.
 ///
 /// # Errors
 /// When it cannot.

@@ -21,30 +21,38 @@ const BLOCK: usize = 32;
 const VALID_EVERY: usize = 10;
 
 /// What the names of our worlds begin with in `env_args`.
-pub const ENV_NAME: &str = "hingecast-";
+pub(crate) const ENV_NAME: &str = "hingecast-";
 
 /// `env_kwargs` of the file: what replays and rollouts need to make the world again.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct WorldArgs {
     /// Model file of the object or twin that was opened.
     pub object: PathBuf,
+    /// What was done with which of its joints.
     pub task: TaskSpec,
+    /// Control steps a second: 20.
     pub control_freq: usize,
+    /// Of the recording: attempt k has the seed `seed * 2^20 + k`.
     pub seed: u64,
 }
 
+/// How a recording by the scripted expert went.
 #[derive(Clone, Debug, Serialize)]
 pub struct Recorded {
+    /// Successful episodes: as many as were asked for.
     pub kept: usize,
-    /// How the attempts that were thrown away ended.
+    /// How the attempts that were thrown away ended, and how many did so.
     pub thrown_away: BTreeMap<Outcome, usize>,
+    /// Control steps of 50 ms in the kept episodes together.
     pub steps: usize,
 }
 
-/// Records `n` successful episodes of `task` on this object or twin.
+/// Records `n` successful episodes of `task` on this object or twin (its model file), in parallel
+/// on the calling thread's rayon pool. Every tenth is in the mask `valid`, the rest in `train`.
 ///
 /// # Errors
-/// Those of `record`; the object cannot be loaded.
+/// When the object cannot be loaded or lacks the task's joint, the demonstrator succeeds in less
+/// than one of four attempts, or the person stops it.
 pub fn record_on(
     object: &Path,
     task: &TaskSpec,
@@ -100,7 +108,7 @@ fn record(scene: &Scene, args: &WorldArgs, n: usize, progress: &Progress) -> Res
 }
 
 /// The file's `env_args`: robomimic's keys with our world in them.
-pub fn env_args(world: &WorldArgs) -> serde_json::Value {
+pub(crate) fn env_args(world: &WorldArgs) -> serde_json::Value {
     serde_json::json!({
         "env_name": format!("{ENV_NAME}{}", world.task.kind.name()),
         // robomimic's number for environments of the gym kind.
@@ -110,7 +118,7 @@ pub fn env_args(world: &WorldArgs) -> serde_json::Value {
 }
 
 /// Which of `n` episodes train and which validate.
-pub fn masks(n: usize) -> BTreeMap<String, Vec<String>> {
+pub(crate) fn masks(n: usize) -> BTreeMap<String, Vec<String>> {
     let names = |valid: bool| -> Vec<String> {
         (0..n).filter(|i| (i % VALID_EVERY == VALID_EVERY - 1) == valid).map(|i| format!("demo_{i}")).collect()
     };
@@ -122,7 +130,7 @@ pub fn masks(n: usize) -> BTreeMap<String, Vec<String>> {
 }
 
 /// Seed of the `k`-th episode of a recording with `seed`.
-pub fn episode_seed(seed: u64, k: usize) -> u64 {
+pub(crate) fn episode_seed(seed: u64, k: usize) -> u64 {
     (seed << 20) + k as u64
 }
 
@@ -136,7 +144,7 @@ fn attempt(env: &mut Env, seed: u64, progress: &Progress) -> Result<(Outcome, Ep
 }
 
 /// An episode while it is being recorded.
-pub struct Tape {
+pub(crate) struct Tape {
     episode: Episode,
     /// What was seen before each action.
     seen: Vec<BTreeMap<String, Vec<f64>>>,
@@ -190,7 +198,7 @@ impl Tape {
     }
 }
 
-/// As the JSON says it, with spaces.
+/// For people, such as `lost grasp`: as the JSON says it, with a space for the hyphen.
 pub fn outcome_name(outcome: Outcome) -> &'static str {
     match outcome {
         Outcome::Success => "success",
@@ -201,10 +209,11 @@ pub fn outcome_name(outcome: Outcome) -> &'static str {
     }
 }
 
-/// The world that demonstrations were recorded in.
+/// The world that demonstrations were recorded in. `file`, where they were read from, is only named
+/// in the error.
 ///
 /// # Errors
-/// When they are not ours.
+/// When they are of another simulator, or of no task of ours.
 pub fn world_of(demos: &Demos, file: &Path) -> Result<WorldArgs> {
     serde_json::from_value(demos.env_args["env_kwargs"].clone()).map_err(|e| {
         Failure::new(

@@ -11,21 +11,25 @@ use plotters::prelude::*;
 use rayon::prelude::*;
 use serde::Serialize;
 
+/// What came out of a replay.
 #[derive(Clone, Debug, Serialize)]
 pub struct Replayed {
+    /// Episodes in the file.
     pub episodes: usize,
     /// Episodes of which every state came out with the same bits.
     pub equal: usize,
-    /// First episode and step that did not.
+    /// Index of the first episode that did not, and its first step that differs, both from 0;
+    /// `None` when all are equal.
     pub first_difference: Option<(usize, usize)>,
     /// Episodes whose replay ends in success.
     pub successes: usize,
 }
 
-/// Runs the recorded actions again from the recorded starts.
+/// Runs the recorded actions again from the recorded starts, episodes in parallel.
 ///
 /// # Errors
-/// When the object is gone, or the file has no states.
+/// When the object is gone or another one now, the file has no states or does not say where the
+/// object stood, an action is not finite, or the person stops it.
 pub fn replay(demos: &Demos, world: &WorldArgs, progress: &Progress) -> Result<Replayed> {
     let config = SceneConfig { object: world.object.clone(), spoil: Vec::new(), visuals: false };
     let scene = Scene::new(&config, &world.task)?;
@@ -81,10 +85,12 @@ fn one(env: &mut Env, episode: &Episode, index: usize) -> Result<(Option<usize>,
     Ok((difference, env.success()))
 }
 
-/// Stands in every plot, and tells it from other pictures.
+/// Axis title that stands in every [`plot()`], and tells it from other pictures.
 pub const HEIGHT: &str = "gripper height, m";
 
-/// Height of the gripper over time, every episode a line: pauses, speeds and second tries show.
+/// Height of the gripper (m, world frame) over time (s) as SVG, every episode a line: pauses,
+/// speeds and second tries show. Empty when no episode has `robot0_eef_pos`, or the height never
+/// changes.
 pub fn plot(demos: &Demos) -> String {
     let key = "robot0_eef_pos";
     let lines: Vec<Vec<(f64, f64)>> = demos

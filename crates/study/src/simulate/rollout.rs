@@ -21,7 +21,7 @@ use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicUsize, Ordering};
 
 /// Seconds of a control step.
-pub const STEP_SECS: f64 = 0.05;
+pub(crate) const STEP_SECS: f64 = 0.05;
 
 /// Settings are chosen on other episodes than those that are reported (seed 0 and its neighbours).
 const SCORE_SEED: u64 = 1 << 20;
@@ -30,14 +30,20 @@ const SCORE_SEED: u64 = 1 << 20;
 pub struct World {
     /// "true", "twin", "axis=30", ...
     pub name: String,
+    /// Its model file, for the report; the scene is what counts.
     pub object: PathBuf,
+    /// What is simulated; all worlds have the same task.
     pub scene: Scene,
 }
 
+/// How one episode went.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct EpisodeResult {
+    /// Gives the object's place, the arm's posture and the policy's dice.
     pub seed: u64,
+    /// How it ended.
     pub outcome: Outcome,
+    /// Control steps of 50 ms, until success or the task's horizon.
     pub steps: usize,
     /// How far the joint moved at most, as a share of the task's (the true object's) range.
     pub moved: f64,
@@ -51,6 +57,7 @@ pub struct EpisodeResult {
 }
 
 impl EpisodeResult {
+    /// Whether it ended in success, the part as the true joint would have it or not.
     pub fn won(&self) -> bool {
         self.outcome == Outcome::Success
     }
@@ -60,37 +67,51 @@ impl EpisodeResult {
     }
 }
 
+/// All episodes of one world.
 #[derive(Clone, Debug, Serialize)]
 pub struct WorldResult {
+    /// That of the [`World`].
     pub name: String,
+    /// Model file of its object.
     pub object: PathBuf,
+    /// How many episodes there are.
     pub episodes: usize,
+    /// How many of them ended in success.
     pub successes: usize,
-    /// Wilson's 95 % interval of the success rate.
+    /// Wilson's 95 % interval of the success rate, 0 to 1.
     pub interval: [f64; 2],
-    /// Episodes that ended as on the true object, with Wilson's interval.
+    /// How many ended with the part where the first world's joint would have it.
     pub as_true: usize,
+    /// Wilson's 95 % interval of their rate, 0 to 1.
     pub as_true_interval: [f64; 2],
+    /// How many episodes ended how; what never came up is left out.
     pub outcomes: BTreeMap<Outcome, usize>,
-    /// Over the successes; `None` without any.
+    /// Simulated seconds, over the successes; `None` without any.
     pub median_secs_to_success: Option<f64>,
     /// Mean over all episodes, share of the true range: wrong limits cannot hide behind it.
     pub mean_moved: f64,
     /// Median distance of the grasped spot from where it ended in the first world, same seed, both
     /// successes, mm. A compliant arm opens many a wrong hinge; where the part then is tells it.
+    /// `None` for the first world, and where no seed succeeded in both.
     pub end_gap_mm: Option<f64>,
-    /// Against the first world: its rate minus this one's.
+    /// Against the first world: its success rate minus this one's. `None` for the first itself.
     pub against_first: Option<Comparison>,
+    /// The same for episodes that ended as true.
     pub as_true_against_first: Option<Comparison>,
+    /// Every episode, in the order of the seeds.
     pub results: Vec<EpisodeResult>,
-    /// Picture strips, when they were asked for: outcome -> file.
+    /// Picture strips, when [`pictures`] were asked for: outcome -> file.
     pub strips: BTreeMap<Outcome, PathBuf>,
 }
 
 /// `n` episodes with seeds `seed * 2^20 + 0 ..` in every world; the first world says what is true.
 ///
 /// # Errors
-/// When the policy wants other observations than this world has, or the person stops it.
+/// When the policy wants other observations than this world has or answers an action that is not
+/// finite, or the person stops it.
+///
+/// # Panics
+/// No episodes: `n` is 0.
 pub fn rollout(
     policy: &Policy,
     worlds: &[World],
@@ -114,7 +135,7 @@ pub fn rollout(
 ///
 /// # Errors
 /// When the policy wants other observations than this world has, or `report` says to stop.
-pub fn episodes(
+pub(crate) fn episodes(
     policy: &Policy,
     scene: &Scene,
     truth: &SpotPath,
@@ -138,11 +159,15 @@ pub fn episodes(
         .collect()
 }
 
-/// The success rate of the policy in `folder` in the world that its demonstrations were recorded
-/// in: a sweep's score.
+/// The success rate, 0 to 1, of the policy in `folder` in the world that its demonstrations were
+/// recorded in, over `n` episodes: a sweep's score. They are none of those that [`rollout`] runs
+/// with a `seed` below 2^20.
 ///
 /// # Errors
-/// Those of [`rollout`].
+/// A folder without a policy; those of [`rollout`].
+///
+/// # Panics
+/// No episodes: `n` is 0.
 pub fn success_rate(folder: &Path, scene: &Scene, n: usize) -> Result<f64> {
     let policy = Policy::load(folder)?;
     let world = World { name: "demonstrated".into(), object: PathBuf::new(), scene: scene.clone() };
@@ -206,7 +231,11 @@ fn summarise(world: &World, results: Vec<EpisodeResult>, first: Option<&[Episode
 }
 
 /// The same seeds in two worlds; where one has fewer episodes, the first ones of the other.
-pub fn compare(first: &[EpisodeResult], this: &[EpisodeResult], won: impl Fn(&EpisodeResult) -> bool) -> Comparison {
+pub(crate) fn compare(
+    first: &[EpisodeResult],
+    this: &[EpisodeResult],
+    won: impl Fn(&EpisodeResult) -> bool,
+) -> Comparison {
     let (first, this): (Vec<bool>, Vec<bool>) = first.iter().zip(this).map(|(a, b)| (won(a), won(b))).unzip();
     Paired::count(&first, &this).compare()
 }
@@ -216,10 +245,12 @@ fn median(mut values: Vec<f64>) -> Option<f64> {
     values.get(values.len() / 2).copied()
 }
 
-/// A strip of pictures of the first episode of every kind of end, per world.
+/// A strip of six pictures of the first episode of every kind of end, per world, as PNG in
+/// `folder`. `results`, as [`rollout`] answers them for these worlds, then say where. For that
+/// these episodes run again.
 ///
 /// # Errors
-/// When the folder cannot be written.
+/// When the folder cannot be written; those of [`rollout`].
 pub fn pictures(
     policy: &Policy,
     worlds: &[World],
@@ -238,7 +269,7 @@ pub fn pictures(
 ///
 /// # Errors
 /// When they cannot be written.
-pub fn strips(
+pub(crate) fn strips(
     policy: &Policy,
     scene: &Scene,
     results: &[EpisodeResult],
@@ -317,10 +348,11 @@ pub fn table(results: &[WorldResult]) -> String {
     out
 }
 
-/// The world of a policy: what `train` noted beside it.
+/// The world of a policy: what `train` noted beside it. `None` without a note that can be read, or
+/// when its demonstrations came from another simulator.
 ///
 /// # Errors
-/// When the note is damaged; `None` when there is none.
+/// When the note is damaged.
 pub fn world_of_policy(folder: &Path) -> Result<Option<super::record::WorldArgs>> {
     let path = folder.join("env_args.json");
     let Ok(bytes) = std::fs::read(&path) else { return Ok(None) };

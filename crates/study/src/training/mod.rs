@@ -13,10 +13,12 @@ use hingecast_policy::Demos;
 use hingecast_policy::train::{Preset, TrainConfig, TrainReport};
 use std::path::Path;
 
-/// Preset, then the file's keys, then pairs such as `net.rnn_hidden=200`.
+/// Preset, then the file's keys, then pairs such as `net.rnn_hidden=200`; the later one counts.
+/// `file`: TOML, only the keys that differ; `None` for the preset and the pairs alone.
 ///
 /// # Errors
-/// Unknown keys, wrong types, values that no training can work with: by name.
+/// A file that cannot be read or is no TOML; unknown keys, wrong types, values that no training can
+/// work with: by name.
 pub fn resolve(preset: Preset, file: Option<&Path>, set: &[String]) -> Result<TrainConfig> {
     let words = Words { example: "learning_rate=3e-4", saved: "train.toml of any policy" };
     let config: TrainConfig = layered(&TrainConfig::preset(preset), file, set, &words)?;
@@ -35,9 +37,10 @@ pub fn may_become_policy(folder: &Path) -> Result<()> {
 }
 
 /// Trains into `folder`, or goes on there: `train.toml`, `env_args.json`, the policy, `loss.svg`.
+/// Runs on the calling thread's rayon pool.
 ///
 /// # Errors
-/// Those of [`hingecast_policy::train::train`].
+/// Those of [`hingecast_policy::train::train`]; a folder that cannot be made or written.
 pub fn train(demos: &Demos, config: &TrainConfig, folder: &Path, progress: &Progress) -> Result<TrainReport> {
     std::fs::create_dir_all(folder).map_err(Failure::io(folder))?;
     let write = |name: &str, text: &str| {

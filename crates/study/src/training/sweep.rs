@@ -41,7 +41,7 @@ enum Mode {
     Random,
 }
 
-/// The file.
+/// The file, as the module's head shows it; [`Sweep::read`] makes one.
 #[derive(Clone, Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Sweep {
@@ -73,19 +73,26 @@ struct Span {
 /// One row of the table.
 #[derive(Clone, Debug, Serialize)]
 pub struct Row {
+    /// Name of the policy's folder inside the sweep's, after its settings.
     pub folder: String,
+    /// What this combination sets: key, such as `net.rnn_hidden`, and value.
     pub settings: BTreeMap<String, toml::Value>,
-    /// `None`: this training failed; `failed` says why.
+    /// At the last step. `None`: this training failed; `failed` says why.
     pub train_loss: Option<f64>,
+    /// At the last step. `None`: it failed, or no demonstrations are kept for validation.
     pub valid_loss: Option<f64>,
-    /// Success rate in rollouts, where they were asked for.
+    /// Success rate in rollouts, 0 to 1. `None`: it failed, or no rollouts were asked for.
     pub success: Option<f64>,
+    /// Why the training, or its score, gave nothing. `None`: both are done.
     pub failed: Option<String>,
 }
 
 impl Sweep {
+    /// Reads and checks a file.
+    ///
     /// # Errors
-    /// No such file, not TOML, nothing to vary, spans in a grid.
+    /// No such file, not TOML, nothing to vary, spans in a grid or without a range, no or more than
+    /// 10 000 combinations. Whether the settings exist is only known to [`run`].
     pub fn read(path: &Path) -> Result<Self> {
         let text = std::fs::read_to_string(path).map_err(Failure::io(path))?;
         let refuse = |what: String, place: &str| {
@@ -192,11 +199,15 @@ fn folder_name(settings: &BTreeMap<String, toml::Value>) -> String {
 /// Runs the sweep into `out`: a folder per combination, then `sweep.json`, `sweep.md` and
 /// `sweep_<setting>.svg`. Answers the rows, best first: by success where `score` gives it (the
 /// success rate of the policy in this folder), else by validation loss. Likelihood is no guide to
-/// success, so a sweep without `score` says which settings fit, not which succeed.
+/// success, so a sweep without `score` says which settings fit, not which succeed. `preset`, `file`
+/// and `set` are what all have in common, as for [`resolve`]; the trainings share `threads`.
 ///
 /// # Errors
 /// Settings that do not exist, disk trouble, Ctrl-C. A training that diverges is a row of the
 /// table, not an error.
+///
+/// # Panics
+/// A sweep that [`Sweep::read`] would refuse; where the system starts no more threads.
 pub fn run(
     sweep: &Sweep,
     preset: Preset,
@@ -302,7 +313,11 @@ impl Job {
     }
 }
 
-/// The rows as a Markdown table.
+/// The rows of one sweep as a Markdown table: success in per cent, losses as they are, `-` for what
+/// is not known.
+///
+/// # Panics
+/// Rows that set other keys than the first: those of two sweeps.
 pub fn table(rows: &[Row]) -> String {
     let keys: Vec<&String> = rows.first().map_or(Vec::new(), |row| row.settings.keys().collect());
     let mut out = String::from("|");

@@ -2,7 +2,7 @@
 //! commands go out.
 //!
 //! A terminal tells when a key goes down and repeats it while it is held; few tell when it goes up
-//! (the kitty protocol does). So a motion lasts for [`HOLD`] after each event of its key, or until
+//! (the kitty protocol does). So a motion lasts for 150 ms after each event of its key, or until
 //! the release where releases are told. World frame, as the picture shows it: x to the right (away
 //! from the arm), y into the picture, z up.
 
@@ -11,7 +11,7 @@ use std::time::Duration;
 
 /// How long a key counts as held after an event: longer than the gap between two repeats (30 to 50
 /// ms, more over a network), short enough that a tap is a nudge of three steps.
-pub const HOLD: Duration = Duration::from_millis(150);
+const HOLD: Duration = Duration::from_millis(150);
 /// Shares of full speed that can be chosen.
 const SPEEDS: [f64; 6] = [0.1, 0.2, 0.35, 0.5, 0.7, 1.0];
 const FIRST_SPEED: usize = 3;
@@ -21,14 +21,20 @@ const TURN: f64 = 0.4;
 /// What a key stands for.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Key {
-    /// Axis 0 .. 5 (x y z, turning about x y z), forward or backward.
+    /// The hand moves, or turns, while it is held.
     Move {
+        /// 0 to 2: along x, y, z; 3 to 5: about x, y, z. World frame.
         axis: usize,
+        /// In the axis' own direction, or against it; turns by the right-hand rule.
         forward: bool,
     },
+    /// The fingers close if they were asked to open, and the other way round.
     Gripper,
+    /// The next higher share of full speed, up to 1.
     Faster,
+    /// The next lower share of full speed, down to 0.1.
     Slower,
+    /// What [`Session::key`](super::session::Session::key) obeys at once.
     Command(Command),
 }
 
@@ -37,24 +43,30 @@ pub enum Key {
 pub enum Command {
     /// Begin to record; while recording: stop and keep.
     Record,
+    /// Throw away what is being recorded and go back to the episode's start.
     Discard,
-    /// One second back.
+    /// One second back, in the world and in the recording.
     Undo,
-    /// Throw the episode away that was kept last.
+    /// Throw the episode away that was kept last; never one from before this session.
     TakeBack,
+    /// End the session; an episode that is being recorded is lost.
     Quit,
 }
 
+/// What happened to a key.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Stroke {
+    /// It went down, or repeats itself on a terminal that cannot tell.
     Down,
     /// A repeat that is known to be one.
     Again,
+    /// It went up; few terminals tell.
     Up,
 }
 
+/// Which keys are held, and what was chosen with them.
 #[derive(Clone, Debug)]
-pub struct Keyboard {
+pub(crate) struct Keyboard {
     /// Whether the terminal tells when keys go up.
     releases: bool,
     /// Per axis and direction (backward, forward): until when it counts as held.
@@ -62,6 +74,7 @@ pub struct Keyboard {
     /// The last event of a key that is no motion: a held one must not act twice.
     last: Option<(Key, Duration)>,
     speed: usize,
+    /// Whether the fingers are asked to close.
     pub closed: bool,
 }
 

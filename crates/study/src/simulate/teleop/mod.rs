@@ -7,7 +7,7 @@
 //! command goes on with the file.
 
 pub mod keys;
-pub mod screen;
+mod screen;
 pub mod session;
 pub mod terminal;
 
@@ -19,16 +19,21 @@ use std::path::Path;
 
 /// What a person asks for; a file that is there already must be of the same.
 pub struct Wanted<'a> {
+    /// What shall be done with the joint.
     pub kind: TaskKind,
+    /// Model file, as [`object_file`](super::object_file) or [`twin_file`](super::twin_file)
+    /// answers it: the path in the file must be the same to the letter.
     pub object: &'a Path,
+    /// Name of the joint; `None`: whichever the file has.
     pub joint: Option<&'a str>,
+    /// Simulated metres per unit of the object's file; `None`: whatever the file has.
     pub scale: Option<f64>,
 }
 
 /// The demonstrations in `file` and their world, to go on from; `None` where there is no such file.
 ///
 /// # Errors
-/// When the file is damaged, or of another task, object, joint or size.
+/// When the file is damaged, of another simulator, or of another task, object, joint or size.
 pub fn go_on(file: &Path, wanted: &Wanted) -> Result<Option<(Demos, WorldArgs)>> {
     if !file.exists() {
         return Ok(None);

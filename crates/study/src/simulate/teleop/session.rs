@@ -18,8 +18,11 @@ use std::time::Duration;
 /// Steps that one undo takes back: a second.
 pub const UNDO_STEPS: usize = 20;
 
+/// A world under a person's keys, and the episodes recorded in it.
 pub struct Session {
+    /// The world that the keys move.
     pub env: Env,
+    /// What is kept: episodes from before this session, then its own.
     pub demos: Demos,
     keyboard: Keyboard,
     world: WorldArgs,
@@ -42,25 +45,34 @@ struct Recording {
 /// What the status lines say.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Status {
+    /// Whether an episode is being recorded; else the person practises.
     pub recording: bool,
-    /// Steps of the recording.
+    /// Control steps of the recording so far; 0 without one.
     pub steps: usize,
     /// Steps that rollouts of this task last.
     pub horizon: usize,
-    /// (q - closed) / (open - closed).
+    /// How far the joint is from closed, share of the task's range.
     pub moved: f64,
+    /// Whether the task is done at this moment.
     pub success: bool,
+    /// Episodes in the file, those from before this session included.
     pub kept: usize,
     /// From the grip site to the place to hold, world frame, m.
     pub to_grasp: [f64; 3],
+    /// Whether both fingers touch the moving part.
     pub holding: bool,
+    /// Whether the fingers are asked to close.
     pub closed: bool,
+    /// Share of full speed, 0.1 to 1.
     pub speed: f64,
+    /// What the last command did, as a sentence.
     pub notice: String,
 }
 
 impl Session {
-    /// `kept`: demonstrations of the same world to go on from.
+    /// The world at the start of the next episode; nothing is recorded yet. `world` must be that of
+    /// `scene`: it goes into the demonstrations. `kept`: demonstrations of the same world to go on
+    /// from; `None` for a new file. `releases`: whether the terminal tells when keys go up.
     pub fn new(scene: &Scene, world: WorldArgs, kept: Option<Demos>, releases: bool) -> Self {
         let demos = kept.unwrap_or_else(|| Demos { env_args: env_args(&world), ..Demos::default() });
         let mut out = Self {
@@ -79,7 +91,11 @@ impl Session {
         out
     }
 
-    /// A key event at `now`.
+    /// A key event at `now`, the time since some moment that is the same for all calls. Commands
+    /// are obeyed at once, motions by the next steps.
+    ///
+    /// # Panics
+    /// A [`Key::Move`] whose axis is above 5.
     pub fn key(&mut self, key: Key, stroke: Stroke, now: Duration) {
         let closed = self.keyboard.closed;
         let command = self.keyboard.event(key, stroke, now);
@@ -101,7 +117,9 @@ impl Session {
         }
     }
 
-    /// One control step of 50 ms, if the world does not wait.
+    /// One control step of 50 ms, if the world does not wait. `now`: as for [`Session::key`]; which
+    /// motions are held then. While recording, success ends the episode and keeps it, and an object
+    /// that is knocked away discards it.
     ///
     /// # Errors
     /// Never in practice: the keys' actions are finite.
@@ -126,11 +144,12 @@ impl Session {
         Ok(())
     }
 
-    /// The terminal lost the focus.
+    /// All motions end: the terminal lost the focus, so releases go elsewhere.
     pub fn let_go(&mut self) {
         self.keyboard.let_go();
     }
 
+    /// Whether [`Command::Quit`] was given; the session can still be driven.
     pub fn wants_to_quit(&self) -> bool {
         self.quit
     }
@@ -145,6 +164,7 @@ impl Session {
         self.env.start()
     }
 
+    /// What the status lines say at this moment.
     pub fn status(&self) -> Status {
         let to_grasp = (self.env.grasp().trans - self.env.grip().trans).to_array();
         Status {

@@ -32,14 +32,20 @@ const LATE: Duration = Duration::from_millis(10);
 /// How well the pace was kept.
 #[derive(Clone, Copy, Debug, Default, Serialize)]
 pub struct Pace {
+    /// Control steps of 50 ms, those included in which the world waits.
     pub steps: usize,
     /// Begun more than 10 ms too late.
     pub late: usize,
+    /// How much too late the worst of them began, ms.
     pub worst_late_ms: f64,
+    /// Frames that were drawn.
     pub pictures: u32,
+    /// From the first step to the end, s.
     pub secs: f64,
 }
 
+/// Makes sure that stdin and stderr are terminals, before anything long begins.
+///
 /// # Errors
 /// When keys cannot come in, or pictures not go out.
 pub fn needed() -> Result<()> {
@@ -62,8 +68,11 @@ pub struct Console {
 }
 
 impl Console {
+    /// Takes the terminal over: raw mode, the alternate screen, no cursor, and key releases where
+    /// it can tell them.
+    ///
     /// # Errors
-    /// When there is no terminal.
+    /// When there is no terminal, or it refuses.
     pub fn open() -> Result<Self> {
         needed()?;
         let unusable = |e: std::io::Error| {
@@ -93,11 +102,12 @@ impl Drop for Console {
     }
 }
 
-/// Drives `session` until the person quits or `wanted` episodes are kept; `save` is called whenever
-/// the kept ones changed.
+/// Drives `session` until the person quits or `wanted` episodes are kept, those from before
+/// included; `save` is called with all of them whenever they changed. Needs an open [`Console`];
+/// `scene` is the session's own, for pictures.
 ///
 /// # Errors
-/// When saving fails, or the person presses Ctrl-C.
+/// When saving fails, the terminal is gone, or the person stops it (Ctrl-C).
 pub fn drive(
     session: &mut Session,
     scene: &Scene,
