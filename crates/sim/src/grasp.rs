@@ -177,7 +177,9 @@ fn at_scale(path: &Path, kind: TaskKind, name: &str, scale: f64) -> Result<Reach
     let Some([low, _]) = object_bounds(&data, hand) else { return none() };
     let Some(part) = bounds(&data, |g| is_part(data.model(), g, &joint)) else { return none() };
     let screw = object::screw(&data, &joint);
-    let way = farthest(part, &screw.motion(open - closed));
+    // A full turn ends where it began.
+    let parts_of_way = (1..=8).map(|k| screw.motion((open - closed) * f64::from(k) / 8.0));
+    let way = parts_of_way.map(|motion| farthest(part, &motion)).fold(0.0, f64::max);
     if way < LEAST_WAY {
         return Ok(Reached::HardlyMoves(way));
     }

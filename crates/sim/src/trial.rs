@@ -2,7 +2,7 @@
 //! of them in the simulator, and the first that works is taken. Geometry does not know the arm's
 //! reach; a try does.
 
-use crate::env::{Env, Outcome};
+use crate::env::{ACTION, Env, Outcome};
 use crate::expert::Expert;
 use crate::grasp::{self, Size};
 use crate::scene::{Scene, SceneConfig};
@@ -16,6 +16,10 @@ const TRIES: u64 = 3;
 /// Sizes that are tried, times what the arm reaches with ease: a handle may be too thick for the
 /// gripper or too near to the next.
 const SIZES: [f64; 5] = [1.0, 0.75, 1.4, 0.55, 1.8];
+
+/// Steps of 50 ms in which nothing may happen, and the share of the way from which something has.
+const ALONE: usize = 20;
+const BY_ITSELF: f64 = 0.25;
 
 /// What was found out on the way.
 #[derive(Clone, Debug)]
@@ -48,13 +52,17 @@ pub fn make_task(path: &Path, kind: TaskKind, joint: Option<&str>, scale: Option
     };
     let config = SceneConfig { object: path.clone(), spoil: Vec::new(), visuals: false };
     let mut best: Option<Made> = None;
-    let (mut places, mut in_the_way) = (0, 0);
+    let (mut places, mut in_the_way, mut by_itself) = (0, 0, 0);
     'sizes: for size in sizes {
         for candidate in grasp::candidates(&path, kind, joint, size)? {
             let scene = Scene::new(&config, &candidate.task)?;
             let mut env = Env::new(&scene);
             if touches_arm(&mut env) {
                 in_the_way += 1;
+                continue;
+            }
+            if moves_by_itself(&mut env)? {
+                by_itself += 1;
                 continue;
             }
             places += 1;
@@ -71,6 +79,11 @@ pub fn make_task(path: &Path, kind: TaskKind, joint: Option<&str>, scale: Option
     }
     match best {
         Some(made) if made.worked > 0 => Ok(made),
+        None if by_itself > 0 => Err(SimError::task(
+            "the part moves by itself before anything touches it: opening it would show nothing",
+            place,
+            "--joint for another joint; or it falls, or its collision shapes overlap where it is closed",
+        )),
         None if in_the_way > 0 => Err(SimError::task(
             "wherever the gripper could hold it, the object stands where the arm begins",
             place,
@@ -90,6 +103,16 @@ pub fn make_task(path: &Path, kind: TaskKind, joint: Option<&str>, scale: Option
             "--joint for another joint, or --scale for a smaller object",
         )),
     }
+}
+
+/// Whether the part goes a quarter of its way within a second in which the arm keeps still: pushed
+/// out by shapes that overlap, or falling.
+fn moves_by_itself(env: &mut Env) -> Result<bool, SimError> {
+    env.reset(u64::MAX);
+    for _ in 0..ALONE {
+        env.step(&[0.0; ACTION])?;
+    }
+    Ok(env.moved_at_most() > BY_ITSELF)
 }
 
 /// Whether arm and object touch where an episode begins: then the arm pushes the part, or is stuck,

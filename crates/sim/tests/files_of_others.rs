@@ -50,6 +50,17 @@ fn a_joint_that_hardly_moves_is_said_before_anything_is_tried() {
     assert!(e.contains("hardly moves: 0.29 deg") && e.lines().count() == 3, "{e}");
 }
 
+/// Pushed open by shapes that overlap, it once counted as opened, in two steps.
+#[test]
+fn a_part_that_moves_by_itself_is_no_demonstration() {
+    let dir = tempfile::tempdir().unwrap();
+    // A spring that wants the lid open.
+    let sprung = covered_box().replace("range=\"0 1.57\"", "range=\"0 1.57\" stiffness=\"5\" springref=\"1.5\"");
+    let file = write(dir.path(), &sprung);
+    let e = make_task(&file, TaskKind::Open, None, None).unwrap_err().to_string();
+    assert!(e.contains("moves by itself") && e.lines().count() == 3, "{e}");
+}
+
 /// A joint that follows another is swept with it, not against it.
 #[test]
 fn doors_that_open_together_sweep_together() {
