@@ -15,6 +15,9 @@ use hingecast::failure::Failure;
 use std::process::ExitCode;
 
 fn main() -> ExitCode {
+    if let Err(failure) = readable_names() {
+        return refuse(&failure, std::env::args_os().any(|a| a == "--json"));
+    }
     let cli = match cli::Cli::try_parse() {
         Ok(cli) => cli,
         Err(e) if matches!(e.kind(), ErrorKind::DisplayHelp | ErrorKind::DisplayVersion) => e.exit(),
@@ -25,6 +28,26 @@ fn main() -> ExitCode {
         Ok(verbs::Outcome::Done) => ExitCode::SUCCESS,
         Ok(verbs::Outcome::UnderBar) => ExitCode::from(1),
         Err(failure) => refuse(&failure, cli.json),
+    }
+}
+
+/// Run files, recordings and answers are JSON and hold paths: names that are not UTF-8 are refused
+/// before anything is written.
+fn readable_names() -> Result<(), Failure> {
+    let strange = |name: &std::ffi::OsStr, place: &str| {
+        let shown = name.to_string_lossy().into_owned();
+        Failure::new(
+            format!("a name is not UTF-8: {shown}"),
+            place,
+            "rename it: letters of any language are fine as UTF-8",
+        )
+    };
+    if let Some(argument) = std::env::args_os().find(|a| a.to_str().is_none()) {
+        return Err(strange(&argument, "the command line"));
+    }
+    match std::env::current_dir() {
+        Ok(folder) if folder.to_str().is_none() => Err(strange(folder.as_os_str(), "the folder that you are in")),
+        _ => Ok(()),
     }
 }
 

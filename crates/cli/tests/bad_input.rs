@@ -265,3 +265,30 @@ fn errors_as_json() {
         }
     }
 }
+
+/// Names that are not UTF-8 once ended in a panic after the first file was written.
+#[cfg(unix)]
+#[test]
+fn names_that_are_not_utf8_are_refused_before_anything_is_written() {
+    use std::os::unix::ffi::OsStrExt;
+    let d = dir();
+    let name = std::ffi::OsStr::from_bytes(b"n\xffu");
+    let run = |at: &Path, words: &[&std::ffi::OsStr]| {
+        let mut command = std::process::Command::new(env!("CARGO_BIN_EXE_hingecast"));
+        let output = command.args(words).current_dir(at).output().unwrap();
+        (output.status.code(), String::from_utf8(output.stderr).unwrap())
+    };
+    let strange = d.path().join(name);
+    std::fs::create_dir(&strange).unwrap();
+    let words = ["synth", "hinged_box", "-o"].map(std::ffi::OsStr::new);
+    let outputs = [
+        run(d.path(), &[&words[..], &[name]].concat()),
+        run(d.path(), &[name]),
+        run(&strange, &[&words[..], &[std::ffi::OsStr::new("rec")]].concat()),
+    ];
+    for (code, stderr) in outputs {
+        assert_eq!(code, Some(2), "{stderr}");
+        assert!(stderr.contains("not UTF-8") && stderr.lines().count() == 3, "{stderr}");
+    }
+    assert_eq!(std::fs::read_dir(&strange).unwrap().count(), 0);
+}

@@ -132,7 +132,9 @@ fn build_with(
         folder.empty()?;
     }
     folder.record.version = env!("CARGO_PKG_VERSION").to_string();
-    folder.record.recording = std::fs::canonicalize(&recording.root).unwrap_or_else(|_| recording.root.clone());
+    let whole = std::fs::canonicalize(&recording.root).unwrap_or_else(|_| recording.root.clone());
+    // JSON holds it: a link may lead to a name that is not UTF-8.
+    folder.record.recording = whole.to_string_lossy().into_owned().into();
     folder.record.fingerprint = recording.fingerprint()?;
     folder.record.threads = threads;
     let text = toml::to_string_pretty(config).expect("a config is a table");

@@ -136,7 +136,7 @@ fn one(file: &mut Joints, entry: &JointOverride, size: &Extent) -> std::result::
         let most = if joint.screw.kind.turns() { 360.0 * MOST_TURNS } else { FARTHEST * size.diagonal };
         if !(lo.abs().max(hi.abs()) <= most) {
             let hint = format!("limits = [lower, upper] within {most:.1}; degrees for hinges, scene units for slides");
-            return Err((format!("limits {lo} .. {hi} are out of all proportion"), hint));
+            return Err((format!("limits {lo:e} .. {hi:e} are out of all proportion"), hint));
         }
         let unit = if joint.screw.kind.turns() { 1f64.to_radians() } else { 1.0 };
         joint.limits = [lo * unit, hi * unit];
