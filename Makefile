@@ -17,9 +17,11 @@ BENCH_FLAGS ?=
 # What `make fuzz` runs, and for how long in all; every reader gets 5 seconds at least.
 FUZZ_TARGETS ?=
 FUZZ_SECONDS ?= 60
+# Flags for scripts/torture: --quick, --seconds N, --only kills,disks,damage,swaps,once.
+TORTURE_FLAGS ?=
 DENY := third_party/cargo-deny/bin/cargo-deny
 
-.PHONY: help setup build demo test fmt circles deny clippy doc tests advisories fuzz bench clean
+.PHONY: help setup build demo test fmt circles deny clippy doc tests advisories fuzz torture bench clean
 
 help:
 	@echo 'make demo    record a sample object (OBJECT=$(OBJECT)), build its twin, write the report'
@@ -27,6 +29,7 @@ help:
 	@echo 'make build   $(TARGET)/release/hingecast'
 	@echo 'make bench   quality and time of a suite (SUITE=$(SUITE)); BENCH_FLAGS="--against baseline.json" compares'
 	@echo 'make fuzz    damaged files for every reader, FUZZ_SECONDS=$(FUZZ_SECONDS) in all; FUZZ_TARGETS="ply_mesh urdf" picks'
+	@echo 'make torture kills, full disks, damaged files, swapped runs; TORTURE_FLAGS="--quick" is a tenth of it'
 	@echo 'make clean   forget what was built; recordings and runs stay'
 	@echo
 	@echo 'one check alone: make fmt | circles | deny | clippy | doc | tests; make advisories asks the network for known holes'
@@ -85,6 +88,9 @@ tests: setup
 fuzz:
 	@CARGO='$(CARGO)' scripts/check_tools.sh
 	@CARGO='$(CARGO)' scripts/fuzz.sh $(FUZZ_SECONDS) $(FUZZ_TARGETS)
+
+torture: build
+	python3 scripts/torture $(TARGET)/release/hingecast $(TORTURE_FLAGS)
 
 bench: build
 	$(TARGET)/release/hingecast bench $(SUITE) $(BENCH_FLAGS)

@@ -135,18 +135,22 @@ pub fn candidates(path: &Path, kind: TaskKind, joint: Option<&str>, size: Size) 
         ));
     }
     let mut out = Vec::new();
-    let mut still = None;
+    // The first joint that hardly moves, and whether any does more than that.
+    let (mut still, mut moves) = (None, false);
     for j in all.iter().filter(|j| joint.is_none_or(|n| n == j.name)) {
         let s = match size {
             Size::Exactly(s) => s,
             Size::Reachable(factor) => two_digits((factor * reachable_scale(&mut data_at(&data), hand, j)).min(1.0)),
         };
         match at_scale(path, kind, &j.name, s)? {
-            Reached::Places(places) => out.extend(places),
+            Reached::Places(places) => {
+                moves = true;
+                out.extend(places);
+            }
             Reached::HardlyMoves(way) => still = still.or(Some((j, way))),
         }
     }
-    if let (true, Some((j, way))) = (out.is_empty(), still) {
+    if let (false, Some((j, way))) = (moves, still) {
         return Err(hardly_moves(j, way, place));
     }
     out.sort_by(|a, b| b.score.total_cmp(&a.score));
