@@ -101,7 +101,10 @@ pub fn write(run: &RunFolder) -> Result<PathBuf> {
 
 fn save(folder: &Path, file: &str, image: &RgbImage) -> Result<()> {
     let path = folder.join(file);
-    image.save(&path).map_err(Failure::io(&path))
+    let mut png = std::io::Cursor::new(Vec::new());
+    image.write_to(&mut png, image::ImageFormat::Png).map_err(Failure::io(&path))?;
+    // Whole or not at all: in place, a kill left empty pictures behind.
+    hingecast_geom::staging::write_quick(&path, png.get_ref()).map_err(Failure::io(&path))
 }
 
 /// `count` frames of a state whose cameras are far apart (farthest-point choice).
