@@ -255,7 +255,7 @@ fn policy(at: &Path) {
     let net = NetConfig { rnn_layers: 1, rnn_hidden: 4, num_modes: 2, actor_layer_dims: vec![3], ..Default::default() };
     let obs = vec![ObsKey { key: "eef_pos".into(), width: 3 }];
     let parameters = Network::new(&net, 3).initial_parameters(0);
-    Policy::new(PolicyConfig::new(obs, 10, net, None, 5), parameters).save(at).unwrap();
+    Policy::new(PolicyConfig::new(obs, 10, net, None, 5), parameters).unwrap().save(at).unwrap();
 }
 
 fn read_policy(at: &Path) -> Result<(), String> {
