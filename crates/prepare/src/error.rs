@@ -1,0 +1,47 @@
+//! What keeps scans from coming together.
+
+use hingecast_articulate::DepthError;
+use hingecast_geom::Cancelled;
+
+/// Why scans could not be prepared.
+#[derive(Debug, thiserror::Error)]
+pub enum PrepareError {
+    /// A view could not be read.
+    #[error(transparent)]
+    Depths(#[from] DepthError),
+    /// A state has too little surface to be placed.
+    #[error("state {state} shows too little surface to be registered: {samples} samples")]
+    Empty {
+        /// The state.
+        state: usize,
+        /// Oriented samples that it has.
+        samples: usize,
+    },
+    /// Nothing that two scans share was found.
+    #[error("state {state} cannot be brought into the frame of state {other}: only {percent:.0} % of it agrees")]
+    Apart {
+        /// The state.
+        state: usize,
+        /// The state that it agrees with best.
+        other: usize,
+        /// Share of the samples that can be judged which agree, percent.
+        percent: f64,
+    },
+    /// Two places fit a scan about equally well.
+    #[error(
+        "state {state} fits into the frame of state {other} in two ways, {degrees:.0} degrees and {distance:.2} apart, almost equally well"
+    )]
+    Ambiguous {
+        /// The state.
+        state: usize,
+        /// The state that it was compared with.
+        other: usize,
+        /// Angle between the two poses, degrees.
+        degrees: f64,
+        /// Farthest that a point of the scan moves from one to the other, scene units.
+        distance: f64,
+    },
+    /// The person asked to stop.
+    #[error(transparent)]
+    Cancelled(#[from] Cancelled),
+}

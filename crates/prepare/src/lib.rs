@@ -1,0 +1,19 @@
+//! Scans as people make them - each with a world of its own, no masks, the room in view - to what
+//! the search for parts needs: one frame for all states, and the object alone.
+//!
+//! ```text
+//! register    the states' frames, brought together on what stands still: pairs of scans globally, all together finely
+//! ```
+//!
+//! World frame, scene units and radians; `a_from_b` maps points of frame b into frame a; cameras are
+//! OpenCV's. Same input and seed give the same bytes with any number of threads.
+
+#![warn(missing_docs)]
+
+mod error;
+pub mod register;
+mod scan;
+
+pub use error::PrepareError;
+pub use register::{Registration, register};
+pub use scan::Scan;

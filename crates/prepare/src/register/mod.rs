@@ -1,0 +1,147 @@
+//! The states' frames, brought together on what stands still.
+//!
+//! Every pair of scans is registered globally: oriented samples that could be the same piece of
+//! surface vote for the turn and the shift that would make them so; the places with most votes are
+//! refined, and judged by what agrees less what one scan saw where the other looked through. The
+//! best pairs connect all states; then all are refined together, finely.
+
+mod balanced;
+mod fine;
+mod pair;
+mod votes;
+
+use crate::error::PrepareError;
+use crate::scan::Scan;
+use glam::DVec3;
+use hingecast_articulate::Depths;
+use hingecast_geom::{Pose, Progress};
+use serde::{Deserialize, Serialize};
+
+/// Up to so many states every pair is tried; beyond, each with the first and the two before it.
+const ALL_PAIRS: usize = 8;
+/// Fewer coarse samples hold no scan.
+const FEW: usize = 200;
+/// A pair agrees when this share of the samples that can be judged does.
+const AGREES: f64 = 0.6;
+/// The second best place of a pair has at most this share of the best one's score.
+const SECOND: f64 = 0.85;
+
+/// What may differ between the frames of two scans.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Freedom {
+    /// A turn about this unit vector, up in every scan, and any shift: phones know gravity.
+    AboutUp(DVec3),
+    /// Any turn and any shift.
+    Any,
+}
+
+/// How the states' frames lie to each other.
+#[derive(Clone, Debug, Serialize, Deserialize)]
+pub struct Registration {
+    /// Of every state: the frame of state 0 from its own.
+    pub common_from_state: Vec<Pose>,
+    /// The pairs that were compared.
+    pub pairs: Vec<PairReport>,
+    /// Largest turn, radians, and shift, scene units, by which two ways of going from one state to
+    /// another around a circle of pairs differ after the fine step; 0 with two states.
+    pub circle: (f64, f64),
+}
+
+/// How well two scans fit.
+#[derive(Clone, Debug, Serialize, Deserialize)]
+pub struct PairReport {
+    /// The two states.
+    pub states: (usize, usize),
+    /// Share of the samples that can be judged which agree, 0..1.
+    pub share: f64,
+    /// Score of the second best place over that of the best, 0..1; near 1 nothing tells them apart.
+    pub second: f64,
+    /// Whether the pair connects its states in the end.
+    pub used: bool,
+}
+
+/// Brings the frames of all states together. Views' pixels of class `OBJECT` count.
+///
+/// # Errors
+/// A state without surface, one that agrees with no other or in two ways, a view that cannot be
+/// read, the wish to stop.
+pub fn register(
+    depths: &mut dyn Depths,
+    freedom: Freedom,
+    seed: u64,
+    progress: &Progress,
+) -> Result<Registration, PrepareError> {
+    let n = depths.n_states();
+    let mut scans = Vec::new();
+    for state in 0..n {
+        progress.report(state, n, "scans")?;
+        let scan = Scan::new(&depths.views(state)?);
+        let samples = scan.as_ref().map_or(0, |s| s.coarse.points.len());
+        scans.push(scan.filter(|_| samples >= FEW).ok_or(PrepareError::Empty { state, samples })?);
+    }
+    let pairs: Vec<(usize, usize)> = (1..n)
+        .flat_map(|s| (0..s).map(move |r| (r, s)))
+        .filter(|(r, s)| n <= ALL_PAIRS || *r == 0 || s - r <= 2)
+        .collect();
+    let mut found = Vec::new();
+    for (k, &(r, s)) in pairs.iter().enumerate() {
+        progress.report(k, pairs.len(), "pairs of scans")?;
+        found.push(pair::align(&scans[s], &scans[r], freedom, seed)?);
+    }
+    let (start, used) = connect(n, &pairs, &found)?;
+    progress.report(0, 1, "all scans together")?;
+    let common_from_state = fine::together(&scans, start, seed);
+    let circle = circle(&pairs, &found, &common_from_state);
+    let reports = pairs.iter().zip(&found).zip(used).map(|((&states, f), used)| PairReport {
+        states,
+        share: f.share,
+        second: f.second,
+        used,
+    });
+    Ok(Registration { common_from_state, pairs: reports.collect(), circle })
+}
+
+/// The tree of the best pairs (Prim 1957): poses in the frame of state 0, and which pairs it uses.
+fn connect(n: usize, pairs: &[(usize, usize)], found: &[pair::Placed]) -> Result<(Vec<Pose>, Vec<bool>), PrepareError> {
+    let mut pose: Vec<Option<Pose>> = vec![None; n];
+    let mut used = vec![false; pairs.len()];
+    pose[0] = Some(Pose::IDENTITY);
+    while let Some(missing) = (0..n).find(|&s| pose[s].is_none()) {
+        let open = |k: &usize| pose[pairs[*k].0].is_some() != pose[pairs[*k].1].is_some();
+        let sure = |k: &usize| found[*k].share >= AGREES && found[*k].second <= SECOND;
+        let best = |filter: &dyn Fn(&usize) -> bool| {
+            let candidates = (0..pairs.len()).filter(|k| open(k) && filter(k));
+            candidates.max_by(|&a, &b| found[a].score.total_cmp(&found[b].score).then(b.cmp(&a)))
+        };
+        let Some(k) = best(&sure) else {
+            let k = best(&|_| true).unwrap_or(0);
+            let (r, s) = pairs.get(k).copied().unwrap_or((0, missing));
+            let (state, other) = if pose[r].is_some() { (s, r) } else { (r, s) };
+            let f = &found[k];
+            return Err(if f.share < AGREES {
+                PrepareError::Apart { state, other, percent: 100.0 * f.share }
+            } else {
+                PrepareError::Ambiguous { state, other, degrees: f.rival.0.to_degrees(), distance: f.rival.1 }
+            });
+        };
+        let ((r, s), r_from_s) = (pairs[k], found[k].pose);
+        match (pose[r], pose[s]) {
+            (Some(from), _) => pose[s] = Some(from * r_from_s),
+            (None, Some(from)) => pose[r] = Some(from * r_from_s.inverse()),
+            (None, None) => unreachable!("an open pair has one end placed"),
+        }
+        used[k] = true;
+    }
+    Ok((pose.into_iter().flatten().collect(), used))
+}
+
+/// How far apart the pairs by themselves and all states together are, over the pairs that agree.
+fn circle(pairs: &[(usize, usize)], found: &[pair::Placed], common: &[Pose]) -> (f64, f64) {
+    let sure = pairs.iter().zip(found).filter(|(_, f)| f.share >= AGREES && f.second <= SECOND);
+    sure.fold((0.0, 0.0), |(turn, shift), (&(r, s), f)| {
+        let together = common[r].inverse() * common[s];
+        let off = together * f.pose.inverse();
+        let moved = (off.apply(f.centre) - f.centre).length();
+        (f64::max(turn, off.angle()), f64::max(shift, moved))
+    })
+}
