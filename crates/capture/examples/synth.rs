@@ -18,7 +18,7 @@ fn run() -> Result<(), CaptureError> {
     let usage = |what: String| {
         CaptureError::new(
             what,
-            "synth OBJECT -o REC [--states N] [--views N] [--test-views N] [--size N] [--seed N] [--range joint=lo:hi] [--noise d435] [--occluders] [--walk]",
+            "synth OBJECT -o REC [--states N] [--views N] [--test-views N] [--size N] [--seed N] [--range joint=lo:hi] [--noise d435] [--occluders] [--walk] [--world JSON]",
             "give an object and an output folder",
         )
     };
@@ -36,6 +36,7 @@ fn run() -> Result<(), CaptureError> {
             "--seed" => config.seed = number(value()?)? as u64,
             "--noise" => config.noise = if value()? == "d435" { Noise::D435 } else { Noise::None },
             "--occluders" => config.occluders = 0.25,
+            "--world" => config.world = serde_json::from_str(&value()?).map_err(|e| usage(format!("--world: {e}")))?,
             "--walk" => config.same_cameras = false,
             "--range" => {
                 let text = value()?;

@@ -1,6 +1,7 @@
 //! The flags. Units and defaults are in the help texts.
 
 mod studies;
+mod world;
 
 use clap::builder::{PossibleValuesParser, TypedValueParser};
 use clap::{Args, Parser, Subcommand};
@@ -8,6 +9,7 @@ use hingecast::config::{Method, Preset};
 use hingecast::import_object::ImportConfig;
 use std::path::PathBuf;
 pub use studies::{Bench, Demos, Experiment, Rollout, Train};
+pub use world::WorldSettings;
 
 /// What a newcomer types first.
 const EXAMPLES: &str = "\
@@ -149,6 +151,8 @@ pub struct SynthSettings {
     /// [default: what it can do].
     #[arg(long = "range", value_name = "JOINT=FROM:TO")]
     pub ranges: Vec<String>,
+    #[command(flatten)]
+    pub world: WorldSettings,
 }
 
 #[derive(Args, Debug)]

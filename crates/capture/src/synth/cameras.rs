@@ -1,5 +1,6 @@
 //! Cameras on the upper hemisphere around the object, all at one distance, looking at its centre.
 
+use super::world::Placement;
 use crate::object::ArticulatedObject;
 use glam::DVec3;
 use hingecast_geom::Camera;
@@ -39,11 +40,11 @@ pub(crate) struct Subject {
 }
 
 impl Subject {
-    /// The object in the joint configurations `states`.
-    pub fn new(object: &ArticulatedObject, states: &[Vec<f64>]) -> Self {
+    /// The object in the joint configurations `states`, where it stands in them.
+    pub fn new(object: &ArticulatedObject, states: &[Vec<f64>], placement: &Placement) -> Self {
         let mut points = Vec::new();
-        for q in states {
-            let poses = object.tree.poses(q);
+        for (state, q) in states.iter().enumerate() {
+            let poses = placement.part_poses(object, q, state);
             let count = object.parts.iter().map(|p| p.vertices.len()).sum::<usize>();
             // 4000 of the vertices; a prime stride does not fall into step with a mesh's rows.
             let stride = [1, 3, 7, 13, 29, 61, 127].into_iter().find(|s| count / s <= 4000).unwrap_or(257);

@@ -1,5 +1,6 @@
 //! What to record, and what came of it.
 
+use super::world::World;
 use crate::CaptureError;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
@@ -36,6 +37,9 @@ pub struct SynthConfig {
     /// A recording of play: in every training frame hands hold the parts that move, and move along;
     /// `time` runs. Instead of `occluders`.
     pub play: bool,
+    /// What stands around the object, and what happens to it and to the recording.
+    #[serde(skip_serializing_if = "World::is_default")]
+    pub world: World,
     /// Write the truth folder beside the recording.
     pub truth: bool,
     /// Of everything random: the same seed gives the same recording.
@@ -57,6 +61,7 @@ impl Default for SynthConfig {
             noise: Noise::None,
             occluders: 0.0,
             play: false,
+            world: World::default(),
             truth: true,
             seed: 0,
         }
@@ -96,6 +101,7 @@ pub(super) fn validate(c: &SynthConfig) -> Result<(), CaptureError> {
         ((8..=4096).contains(&c.size), "size", c.size.to_string(), "8 to 4096 pixels"),
         (c.fov_deg > 5.0 && c.fov_deg < 120.0, "fov_deg", c.fov_deg.to_string(), "5 to 120 degrees"),
         ((0.0..=1.0).contains(&c.occluders), "occluders", c.occluders.to_string(), "a share from 0 to 1"),
+        (push_is_sane(c), "push", format!("{:?}", c.world.push), "finite mm and degrees, in states from 1 to the last"),
         (!(c.play && c.occluders > 0.0), "occluders", c.occluders.to_string(), "0 with play: hands are in all frames"),
     ];
     match checks.into_iter().find(|(good, ..)| !good) {
@@ -104,4 +110,11 @@ pub(super) fn validate(c: &SynthConfig) -> Result<(), CaptureError> {
             Err(CaptureError::new(format!("{key} is out of range"), format!("synth: {key} = {value}"), hint))
         }
     }
+}
+
+fn push_is_sane(c: &SynthConfig) -> bool {
+    c.world.push.as_ref().is_none_or(|p| {
+        let finite = p.mm.is_finite() && p.deg.is_finite();
+        finite && c.states > 1 && p.states.iter().all(|s| (1..c.states).contains(s))
+    })
 }

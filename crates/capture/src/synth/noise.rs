@@ -7,6 +7,8 @@
 //! edge; camera poses, which tracking made, by 0.5 deg and 3 mm.
 
 use super::output::Exposure;
+use super::smooth::Smooth;
+use super::world::masks::wander;
 use glam::{DQuat, DVec3};
 use hingecast_geom::random::normal;
 use hingecast_geom::{Camera, Pose};
@@ -37,7 +39,7 @@ const POSE_METRES: f64 = 0.003;
 pub(super) fn d435(e: &mut Exposure, camera: &mut Camera, metres_per_unit: f64, rng: &mut fastrand::Rng) {
     depth(e, camera, metres_per_unit, rng);
     color(e, rng);
-    mask(e, camera.width, camera.height, rng);
+    wander(&mut e.mask, camera.width, camera.height, rng);
     pose(camera, metres_per_unit, rng);
 }
 
@@ -90,21 +92,6 @@ fn color(e: &mut Exposure, rng: &mut fastrand::Rng) {
     }
 }
 
-/// Reads the mask at places that wander by 1 to 3 pixels, slowly along the edge.
-fn mask(e: &mut Exposure, w: usize, h: usize, rng: &mut fastrand::Rng) {
-    let amplitude = 1.0 + 2.0 * rng.f64();
-    let fields = [Smooth::new(w, h, 9.0, rng), Smooth::new(w, h, 9.0, rng)];
-    let exact = e.mask.clone();
-    for y in 0..h {
-        for x in 0..w {
-            let shift = |f: &Smooth| (0.7 * amplitude * f.at(x, y)).clamp(-3.0, 3.0);
-            let sx = (x as f64 + shift(&fields[0])).round().clamp(0.0, (w - 1) as f64) as usize;
-            let sy = (y as f64 + shift(&fields[1])).round().clamp(0.0, (h - 1) as f64) as usize;
-            e.mask[y * w + x] = exact[sy * w + sx];
-        }
-    }
-}
-
 /// Root mean square over the three axes together: 0.5 deg and 3 mm.
 fn pose(camera: &mut Camera, metres_per_unit: f64, rng: &mut fastrand::Rng) {
     let per_axis = 1.0 / 3f64.sqrt();
@@ -112,29 +99,6 @@ fn pose(camera: &mut Camera, metres_per_unit: f64, rng: &mut fastrand::Rng) {
     let (turn, shift) = (vector(POSE_DEG.to_radians()), vector(POSE_METRES / metres_per_unit));
     // In the camera's own frame: turning about the camera, not about the world's origin.
     camera.camera_from_world = Pose::new(DQuat::from_scaled_axis(turn), shift) * camera.camera_from_world;
-}
-
-/// Noise of unit variance at its nodes, bilinear between them.
-struct Smooth {
-    nodes: Vec<f64>,
-    columns: usize,
-    cell: f64,
-}
-
-impl Smooth {
-    fn new(w: usize, h: usize, cell: f64, rng: &mut fastrand::Rng) -> Self {
-        let columns = (w as f64 / cell) as usize + 2;
-        let rows = (h as f64 / cell) as usize + 2;
-        Self { nodes: (0..columns * rows).map(|_| normal(rng)).collect(), columns, cell }
-    }
-
-    fn at(&self, x: usize, y: usize) -> f64 {
-        let (u, v) = (x as f64 / self.cell, y as f64 / self.cell);
-        let (c, r) = (u as usize, v as usize);
-        let (fu, fv) = (u.fract(), v.fract());
-        let node = |dc: usize, dr: usize| self.nodes[(r + dr) * self.columns + c + dc];
-        (node(0, 0) * (1.0 - fu) + node(1, 0) * fu) * (1.0 - fv) + (node(0, 1) * (1.0 - fu) + node(1, 1) * fu) * fv
-    }
 }
 
 #[cfg(test)]
@@ -182,17 +146,6 @@ mod tests {
         }
         let (angle, shift) = ((angle / n as f64).sqrt(), (shift / n as f64).sqrt());
         assert!((angle - 0.5).abs() < 0.02 && (shift - 0.003).abs() < 1.2e-4, "{angle} deg, {shift} m");
-    }
-
-    #[test]
-    fn mask_edges_wander_and_stay_within_three_pixels() {
-        let (mut e, _) = wall(1.0);
-        for i in 0..64 * 64 {
-            e.mask[i] = if i % 64 < 32 { 255 } else { 0 };
-        }
-        mask(&mut e, 64, 64, &mut fastrand::Rng::with_seed(3));
-        let wrong: Vec<usize> = (0..64 * 64).filter(|i| (e.mask[*i] == 255) != (i % 64 < 32)).map(|i| i % 64).collect();
-        assert!(wrong.len() > 10 && wrong.iter().all(|x| (29..35).contains(x)), "{wrong:?}");
     }
 
     #[test]

@@ -2,10 +2,11 @@
 
 use super::coupled::{self, useful_ranges};
 use super::ranges::UsefulRange;
+use super::world::{Placement, Site};
 use super::{SynthConfig, cameras, play};
 use crate::object::ArticulatedObject;
 use crate::{CaptureError, Split};
-use glam::DVec3;
+use glam::{DVec3, Vec3};
 use hingecast_geom::Camera;
 
 /// One view to render.
@@ -46,31 +47,44 @@ pub(super) fn ranges(object: &ArticulatedObject, config: &SynthConfig) -> Result
     Ok(useful)
 }
 
+/// When each state is recorded, in numbers of recorded states; held-out ones stand half-way between
+/// two recorded ones, spread over the play.
+pub(super) fn times(config: &SynthConfig) -> Vec<f64> {
+    let last = (config.states.max(2) - 1) as f64;
+    let held_out = if config.states < 3 { 0 } else { config.test_states };
+    let between = (0..held_out).map(|k| (last * (k + 1) as f64 / (held_out + 1) as f64).floor() + 0.5);
+    (0..config.states).map(|s| s as f64).chain(between).collect()
+}
+
 /// Joint values of the recorded states, then of the held-out ones between them.
 pub(super) fn joint_values(object: &ArticulatedObject, config: &SynthConfig, ranges: &[UsefulRange]) -> Vec<Vec<f64>> {
     let mut rng = fastrand::Rng::with_seed(config.seed ^ 0x706c_6179);
     let behind: Vec<bool> = ranges.iter().map(|r| r.behind).collect();
     let play = play::Play::new(&behind, config.states == 2, &mut rng);
     let last = (config.states.max(2) - 1) as f64;
-    let held_out = if config.states < 3 { 0 } else { config.test_states };
-    // Held-out states stand half-way between two recorded ones, spread over the play.
-    let between = (0..held_out).map(|k| (last * (k + 1) as f64 / (held_out + 1) as f64).floor() + 0.5);
-    let times = (0..config.states).map(|s| s as f64).chain(between).map(|s| s / last);
     let value = |(f, r): (f64, &UsefulRange)| r.lower + f * (r.upper - r.lower);
     let at = |t: f64| {
         let mut q: Vec<f64> = play.fractions(t).into_iter().zip(ranges).map(value).collect();
         object.tree.follow(&mut q);
         q
     };
-    times.map(at).collect()
+    times(config).into_iter().map(|s| at(s / last)).collect()
 }
 
 /// All views: per state the training cameras, then the held-out ones.
-pub(super) fn shots(object: &ArticulatedObject, config: &SynthConfig, states: &[Vec<f64>]) -> Vec<Shot> {
+pub(super) fn shots(
+    object: &ArticulatedObject,
+    config: &SynthConfig,
+    states: &[Vec<f64>],
+    placement: &Placement,
+    site: Option<&Site>,
+) -> Vec<Shot> {
     let fov = config.fov_deg.to_radians();
-    let subject = cameras::Subject::new(object, states);
+    let subject = cameras::Subject::new(object, states, placement);
     let directions = |salt: u64, n: usize| {
-        cameras::directions(n, &mut fastrand::Rng::with_seed(config.seed.wrapping_mul(0x9e37_79b9) ^ salt))
+        let mut rng = fastrand::Rng::with_seed(config.seed.wrapping_mul(0x9e37_79b9) ^ salt);
+        let all = cameras::directions(n, &mut rng).into_iter();
+        all.map(|d| site.map_or(d, |site| site.in_front(d))).collect::<Vec<_>>()
     };
     let per_state = |state: usize| {
         let salt = if config.same_cameras { 0 } else { state as u64 };
@@ -91,8 +105,9 @@ pub(super) fn shots(object: &ArticulatedObject, config: &SynthConfig, states: &[
     shots
 }
 
-/// Scene units per depth step: a ten-thousandth unless the object is too far for 16 bits.
-pub(super) fn depth_scale(object: &ArticulatedObject, shots: &[Shot]) -> f64 {
+/// Scene units per depth step: a ten-thousandth unless the object, or the `surroundings` (points of
+/// the world), are too far for 16 bits.
+pub(super) fn depth_scale(object: &ArticulatedObject, shots: &[Shot], surroundings: &[Vec3]) -> f64 {
     let (lo, hi) = object.bounds(&vec![0.0; object.tree.joints.len()]);
     let centre = 0.5 * (lo + hi);
     let farthest =
@@ -104,6 +119,11 @@ pub(super) fn depth_scale(object: &ArticulatedObject, shots: &[Shot]) -> f64 {
     // Small objects (a pair of glasses in metres) deserve finer steps.
     while farthest / (scale / 10.0) < 65_535.0 {
         scale /= 10.0;
+    }
+    let z = |s: &Shot, x: &Vec3| s.camera.camera_from_world.apply(x.as_dvec3()).z;
+    let around = shots.iter().flat_map(|s| surroundings.iter().map(move |x| z(s, x))).fold(0.0, f64::max);
+    while around / scale > 65_535.0 {
+        scale *= 2.0;
     }
     scale
 }

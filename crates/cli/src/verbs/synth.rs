@@ -30,6 +30,7 @@ pub fn config(settings: &SynthSettings, seed: u64, truth: bool) -> Result<SynthC
         noise: if settings.noise == "d435" { Noise::D435 } else { Noise::None },
         occluders: settings.occluders.unwrap_or(0.0),
         play: settings.play,
+        world: settings.world.world(),
         ranges,
         truth,
         seed,
