@@ -2,20 +2,11 @@
 
 mod common;
 
-use common::{record, small};
+use common::{made, small, with};
 use glam::{DVec2, DVec3};
 use hingecast_capture::synth::{Frames, Masks, Push, Scenery, SynthConfig, World};
 use hingecast_capture::{Recording, Split, Truth};
 use hingecast_geom::Pose;
-
-fn with(world: World) -> SynthConfig {
-    SynthConfig { world, ..small() }
-}
-
-fn made(dir: &std::path::Path, config: &SynthConfig) -> (Recording, Truth) {
-    let report = record(dir, config);
-    (Recording::open(&report.recording).unwrap(), Truth::open(&report.truth.unwrap()).unwrap())
-}
 
 /// Points of the world that the object's (`own`) or the other pixels of a frame show.
 fn points(recording: &Recording, truth: &Truth, frame: usize, own: bool) -> Vec<DVec3> {

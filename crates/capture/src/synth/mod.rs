@@ -7,6 +7,7 @@
 mod cameras;
 mod config;
 mod coupled;
+mod drift;
 mod noise;
 mod occluder;
 mod output;
@@ -20,6 +21,7 @@ mod shade;
 mod smooth;
 mod staging;
 mod still;
+mod trajectory;
 mod world;
 
 pub use config::{Noise, SynthConfig, SynthReport};
@@ -27,7 +29,7 @@ pub use coupled::useful_ranges;
 pub use ranges::UsefulRange;
 pub(crate) use staging::Staging;
 pub use staging::may_be_replaced;
-pub use world::{Frames, Masks, Push, Scenery, World};
+pub use world::{Drift, Frames, Lens, Masks, Push, Scenery, Trajectory, World};
 
 use crate::object::{ArticulatedObject, PartGeometry};
 use crate::{CaptureError, Frame, Recording, Split, Truth};
@@ -81,7 +83,7 @@ pub fn synth(
     let placement = Placement::new(object, config, &plan::times(config), front, metres_per_unit);
     let site = (config.world.scene == Scenery::Room)
         .then(|| Site::new(object, &states, &placement, front, 1.0 / metres_per_unit, config.seed));
-    let shots = plan::shots(object, config, &states, &placement, site.as_ref());
+    let shots = plan::shots(object, config, &states, &placement, front, site.as_ref());
     let room = site.as_ref().map(|site| {
         let cameras: Vec<Camera> = shots.iter().map(|s| s.camera).collect();
         // The material after the object's own is that of hands.
@@ -132,7 +134,7 @@ pub fn synth(
         recording: out,
         truth: config.truth.then_some(truth_out),
         frames: shots.len(),
-        notes: still::notes(object, &ranges, &shots),
+        notes: still::notes(object, &states[..config.states], &shots),
         ranges: names.zip(ranges.iter().map(|r| [r.lower, r.upper])).collect(),
     })
 }
@@ -177,6 +179,11 @@ impl Studio<'_> {
         let looks = shade::Looks::new(self.object, self.room, hands.iter().map(|h| h.0));
         let with_hands = (!hands.is_empty()).then(|| scene::Scene::new(bodies().chain(hands.iter().copied())));
         poses.extend(self.room.map(|_| Pose::IDENTITY));
+        let drifted = self.config.world.drift.map_or(Vec::new(), |size| {
+            let seed = self.config.seed ^ 0x6472_6966_7400 ^ ((state as u64) << 48);
+            let mut rng = fastrand::Rng::with_seed(seed.wrapping_mul(0x9e37_79b9_7f4a_7c15));
+            drift::along(self.config.views, &size, 1e-3 / self.metres_per_unit, &mut rng)
+        });
         poses.extend(hands.iter().map(|h| h.1));
         shots
             .par_iter()
@@ -200,8 +207,9 @@ impl Studio<'_> {
                     world::masks::segmenter(&mut mask, camera.width, camera.height, &mut rng);
                     mask
                 });
-                if train && self.config.noise == Noise::D435 {
-                    noise::d435(&mut exposure, &mut camera, self.metres_per_unit, &mut rng);
+                if train {
+                    noise::sense(self.config.noise, &mut exposure, &mut camera, self.metres_per_unit, &mut rng);
+                    camera = drifted.get(shot.view).map_or(camera, |off| drift::stated(camera, *off));
                 }
                 if let Some(mask) = segmented {
                     exposure.mask = mask;

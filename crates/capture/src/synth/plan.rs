@@ -1,9 +1,10 @@
 //! Which joint values and which cameras a recording has.
 
+use super::cameras::Optics;
 use super::coupled::{self, useful_ranges};
 use super::ranges::UsefulRange;
-use super::world::{Placement, Site};
-use super::{SynthConfig, cameras, play};
+use super::world::{Placement, Site, Trajectory};
+use super::{SynthConfig, cameras, play, trajectory};
 use crate::object::ArticulatedObject;
 use crate::{CaptureError, Split};
 use glam::{DVec3, Vec3};
@@ -71,35 +72,39 @@ pub(super) fn joint_values(object: &ArticulatedObject, config: &SynthConfig, ran
     times(config).into_iter().map(|s| at(s / last)).collect()
 }
 
-/// All views: per state the training cameras, then the held-out ones.
+/// All views: per state the training cameras, then the held-out ones. `front`: towards which the
+/// object opens.
 pub(super) fn shots(
     object: &ArticulatedObject,
     config: &SynthConfig,
     states: &[Vec<f64>],
     placement: &Placement,
+    front: DVec3,
     site: Option<&Site>,
 ) -> Vec<Shot> {
-    let fov = config.fov_deg.to_radians();
-    let subject = cameras::Subject::new(object, states, placement);
-    let directions = |salt: u64, n: usize| {
-        let mut rng = fastrand::Rng::with_seed(config.seed.wrapping_mul(0x9e37_79b9) ^ salt);
-        let all = cameras::directions(n, &mut rng).into_iter();
-        all.map(|d| site.map_or(d, |site| site.in_front(d))).collect::<Vec<_>>()
+    let optics = match config.world.lens {
+        Some(lens) => Optics::of(lens),
+        None => Optics::square(config.size, config.fov_deg.to_radians()),
     };
+    let subject = cameras::Subject::new(object, states, placement);
+    let way = config.world.trajectory;
+    let stands = |salt: u64, n: usize| {
+        let mut rng = fastrand::Rng::with_seed(config.seed.wrapping_mul(0x9e37_79b9) ^ salt);
+        trajectory::stands(way, n, front, site, &mut rng)
+    };
+    let rig = config.same_cameras && way != Trajectory::Walk;
     let per_state = |state: usize| {
-        let salt = if config.same_cameras { 0 } else { state as u64 };
-        let train = if state < config.states { directions(salt, config.views) } else { Vec::new() };
-        (train, directions(1_000_003 + state as u64, config.test_views))
+        let salt = if rig { 0 } else { state as u64 };
+        let train = if state < config.states { stands(salt, config.views) } else { Vec::new() };
+        (train, stands(1_000_003 + state as u64, config.test_views))
     };
     let all: Vec<_> = (0..states.len()).map(per_state).collect();
-    let every: Vec<DVec3> = all.iter().flat_map(|(train, test)| train.iter().chain(test).copied()).collect();
-    let distance = subject.distance(&every, fov);
+    let distance = subject.distance(all.iter().flat_map(|(train, test)| train.iter().chain(test)), &optics);
     let mut shots = Vec::new();
     for (state, (train, test)) in all.iter().enumerate() {
-        let splits = train.iter().map(|d| (Split::Train, d)).chain(test.iter().map(|d| (Split::Test, d)));
-        for (view, (split, &direction)) in splits.enumerate() {
-            let camera = subject.camera(direction, distance, config.size, fov);
-            shots.push(Shot { state, view, split, camera });
+        let splits = train.iter().map(|s| (Split::Train, s)).chain(test.iter().map(|s| (Split::Test, s)));
+        for (view, (split, stand)) in splits.enumerate() {
+            shots.push(Shot { state, view, split, camera: subject.camera(stand, distance, &optics) });
         }
     }
     shots

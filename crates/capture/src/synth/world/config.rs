@@ -1,6 +1,7 @@
 //! The settings of the world around the object. As they are by default there is none: the object
 //! floats in front of a plain background, and everything about it is known exactly.
 
+use super::lens::Lens;
 use serde::{Deserialize, Serialize};
 
 /// What stands around the object, and what happens to it and to the recording.
@@ -15,6 +16,12 @@ pub struct World {
     pub frames: Frames,
     /// Somebody pushes the object between two states.
     pub push: Option<Push>,
+    /// Size and lens of the pictures; none: square ones of `size`.
+    pub lens: Option<Lens>,
+    /// Where the cameras go.
+    pub trajectory: Trajectory,
+    /// How far the stated poses of training frames wander off.
+    pub drift: Option<Drift>,
 }
 
 impl World {
@@ -63,6 +70,31 @@ pub enum Frames {
     Tilted,
 }
 
+/// Where cameras stand, those of held-out frames, too.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Trajectory {
+    /// All around, from the horizon to straight above, at one distance.
+    #[default]
+    Hemisphere,
+    /// A person's arc of 200 degrees around the front (160 beside a wall), at changing heights and
+    /// distances, with a hand that is not steady; anew in each state.
+    Walk,
+    /// Up to 70 degrees to either side of the front, to 53 degrees above the horizon.
+    Front,
+}
+
+/// Drift of a tracker along the way of each state: the poses of its training frames, in order, wander
+/// off smoothly; the first is right, the worst is off by this.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Drift {
+    /// Largest turn, degrees, about the camera.
+    pub deg: f64,
+    /// Largest shift, millimetres.
+    pub mm: f64,
+}
+
 /// The object as a whole is pushed along the floor, between two states, and stays there.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -84,6 +116,18 @@ impl std::str::FromStr for Push {
     fn from_str(text: &str) -> Result<Self, String> {
         let (mm, deg) = pair(text).ok_or_else(|| format!("'{text}' is not MM[:DEG], such as 30 or 12:1.5"))?;
         Ok(Self { mm, deg: deg.unwrap_or(2.0), states: Vec::new() })
+    }
+}
+
+impl std::str::FromStr for Drift {
+    type Err = String;
+
+    /// `DEG:MM`.
+    fn from_str(text: &str) -> Result<Self, String> {
+        match pair(text) {
+            Some((deg, Some(mm))) => Ok(Self { deg, mm }),
+            _ => Err(format!("'{text}' is not DEG:MM, such as 1:10")),
+        }
     }
 }
 

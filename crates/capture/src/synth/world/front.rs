@@ -49,3 +49,20 @@ fn opens_towards(joint: &Joint, range: &UsefulRange, centre: DVec3) -> DVec3 {
         from_hinge(range.lower) + from_hinge(range.upper)
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::synth::useful_ranges;
+
+    /// As objects/README.md has it.
+    #[test]
+    fn samples_have_their_front_where_they_open() {
+        let objects = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("../../objects");
+        for name in ["microwave", "three_drawers", "cabinet_two_door", "hinged_box", "pedal_bin", "covered_box"] {
+            let object = ArticulatedObject::load(&objects.join(name)).unwrap();
+            let wanted = if name == "covered_box" { DVec3::NEG_X } else { DVec3::NEG_Y };
+            assert_eq!(front(&object, &useful_ranges(&object)), wanted, "{name}");
+        }
+    }
+}

@@ -4,14 +4,16 @@
 mod clutter;
 mod config;
 mod front;
+mod lens;
 pub(super) mod masks;
 mod patterns;
 mod placement;
 mod room;
 mod site;
 
-pub use config::{Frames, Masks, Push, Scenery, World};
+pub use config::{Drift, Frames, Masks, Push, Scenery, Trajectory, World};
 pub(super) use front::front;
+pub use lens::Lens;
 pub(super) use placement::Placement;
 pub(super) use room::Room;
 pub(super) use site::Site;

@@ -6,9 +6,11 @@
 //! each view its own exposure; masks, which a network made, are off by 1 to 3 pixels along the
 //! edge; camera poses, which tracking made, by 0.5 deg and 3 mm.
 
-use super::output::Exposure;
-use super::smooth::Smooth;
-use super::world::masks::wander;
+use super::color;
+use super::shape::Shape;
+use crate::synth::output::Exposure;
+use crate::synth::smooth::Smooth;
+use crate::synth::world::masks::wander;
 use glam::{DQuat, DVec3};
 use hingecast_geom::random::normal;
 use hingecast_geom::{Camera, Pose};
@@ -20,25 +22,15 @@ const FOCAL_TIMES_BASELINE: f64 = 640.0 * 0.050;
 const DISPARITY_FINE: f64 = 0.05;
 const DISPARITY_PATCH: f64 = 0.04;
 const DISPARITY_STEP: f64 = 1.0 / 32.0;
-/// Steeper than this against the ray, stereo starts to lose the surface; at the second slope it has
-/// lost it. Tangents of 70 and 82 degrees.
-const GRAZING: [f64; 2] = [2.75, 7.1];
-/// A jump of more than this share of z is an edge, and the pixels beside it are lost with this
-/// probability.
-const EDGE_JUMP: f32 = 0.03;
+/// Chance that a pixel beside an edge is lost.
 const EDGE_LOSS: f64 = 0.5;
-/// sRGB steps of 255: read noise, and photon noise of white.
-const READ_NOISE: f64 = 1.2;
-const SHOT_NOISE: f64 = 2.0;
-const EXPOSURE: f64 = 0.05;
-const WHITE_BALANCE: f64 = 0.012;
 const POSE_DEG: f64 = 0.5;
 const POSE_METRES: f64 = 0.003;
 
 /// Replaces a perfect exposure and camera by what would have been recorded.
-pub(super) fn d435(e: &mut Exposure, camera: &mut Camera, metres_per_unit: f64, rng: &mut fastrand::Rng) {
+pub(super) fn record(e: &mut Exposure, camera: &mut Camera, metres_per_unit: f64, rng: &mut fastrand::Rng) {
     depth(e, camera, metres_per_unit, rng);
-    color(e, rng);
+    color::noise(e, rng);
     wander(&mut e.mask, camera.width, camera.height, rng);
     pose(camera, metres_per_unit, rng);
 }
@@ -56,19 +48,9 @@ fn depth(e: &mut Exposure, camera: &Camera, metres_per_unit: f64, rng: &mut fast
             if z == 0.0 {
                 continue;
             }
-            let at = |dx: isize, dy: isize| {
-                let (x, y) = (x as isize + dx, y as isize + dy);
-                let inside = x >= 0 && y >= 0 && x < w as isize && y < h as isize;
-                if inside { exact[y as usize * w + x as usize] } else { z }
-            };
-            let edge =
-                [(-1, 0), (1, 0), (0, -1), (0, 1)].iter().any(|&(dx, dy)| (at(dx, dy) - z).abs() > EDGE_JUMP * z);
-            // The smaller of the two one-sided differences: an edge on one side is not a slope.
-            let slope = |a: f32, b: f32, focal: f64| f64::from((a - z).abs().min((b - z).abs())) * focal / f64::from(z);
-            let (sx, sy) = (slope(at(-1, 0), at(1, 0), camera.fx), slope(at(0, -1), at(0, 1), camera.fy));
-            let steep = sx.hypot(sy);
-            let grazing_loss = ((steep - GRAZING[0]) / (GRAZING[1] - GRAZING[0])).clamp(0.0, 1.0);
-            let loss = if edge { EDGE_LOSS.max(grazing_loss) } else { grazing_loss };
+            let shape = Shape::at(&exact, camera, x, y);
+            let grazing_loss = shape.grazing_loss();
+            let loss = if shape.edge { EDGE_LOSS.max(grazing_loss) } else { grazing_loss };
             if luck < loss {
                 e.depth[i] = 0.0;
                 continue;
@@ -79,16 +61,6 @@ fn depth(e: &mut Exposure, camera: &Camera, metres_per_unit: f64, rng: &mut fast
             e.depth[i] =
                 if disparity > 0.0 { (FOCAL_TIMES_BASELINE / disparity / metres_per_unit) as f32 } else { 0.0 };
         }
-    }
-}
-
-fn color(e: &mut Exposure, rng: &mut fastrand::Rng) {
-    let exposure = (EXPOSURE * normal(rng)).exp();
-    let gain = [0; 3].map(|_| exposure * (WHITE_BALANCE * normal(rng)).exp());
-    for (i, value) in e.rgb.iter_mut().enumerate() {
-        let exact = f64::from(*value) * gain[i % 3];
-        let std = (READ_NOISE.powi(2) + SHOT_NOISE.powi(2) * exact / 255.0).sqrt();
-        *value = (exact + std * normal(rng)).round().clamp(0.0, 255.0) as u8;
     }
 }
 
@@ -103,22 +75,8 @@ fn pose(camera: &mut Camera, metres_per_unit: f64, rng: &mut fastrand::Rng) {
 
 #[cfg(test)]
 mod tests {
+    use super::super::scene::{steps, wall};
     use super::*;
-
-    /// A wall seen straight on at `z` metres.
-    fn wall(z: f32) -> (Exposure, Camera) {
-        let camera = Camera::look_at(DVec3::ZERO, DVec3::X, DVec3::Z, 64, 64, 0.7);
-        let n = 64 * 64;
-        let e = Exposure {
-            rgb: vec![128; 3 * n],
-            depth: vec![z; n],
-            mask: vec![255; n],
-            labels: vec![1; n],
-            occluder: None,
-            occluded: false,
-        };
-        (e, camera)
-    }
 
     #[test]
     fn depth_noise_grows_with_the_square_of_the_distance() {
@@ -150,18 +108,7 @@ mod tests {
 
     #[test]
     fn edges_and_grazing_surfaces_have_holes() {
-        let (mut e, camera) = wall(1.0);
-        for i in 0..64 * 64 {
-            // Left: a wall seen at 85 degrees; right: a step back.
-            let x = i % 64;
-            e.depth[i] = if x < 20 {
-                1.0 + 0.15 * x as f32
-            } else if x < 40 {
-                1.0
-            } else {
-                1.5
-            };
-        }
+        let (mut e, camera) = steps();
         depth(&mut e, &camera, 1.0, &mut fastrand::Rng::with_seed(5));
         let holes = |x: usize| (0..64).filter(|y| e.depth[y * 64 + x] == 0.0).count();
         assert!(holes(5) > 50, "grazing: {}", holes(5));
