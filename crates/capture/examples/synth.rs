@@ -3,7 +3,7 @@
 
 use hingecast_capture::CaptureError;
 use hingecast_capture::object::ArticulatedObject;
-use hingecast_capture::synth::{Noise, SynthConfig, synth};
+use hingecast_capture::synth::{SynthConfig, synth};
 use hingecast_geom::Progress;
 use std::path::PathBuf;
 
@@ -18,7 +18,7 @@ fn run() -> Result<(), CaptureError> {
     let usage = |what: String| {
         CaptureError::new(
             what,
-            "synth OBJECT -o REC [--states N] [--views N] [--test-views N] [--size N] [--seed N] [--range joint=lo:hi] [--noise d435] [--occluders] [--walk]",
+            "synth OBJECT -o REC [--states N] [--views N] [--test-views N] [--size N] [--seed N] [--range joint=lo:hi] [--noise d435|stereo|tof] [--occluders] [--walk] [--world JSON]",
             "give an object and an output folder",
         )
     };
@@ -34,8 +34,11 @@ fn run() -> Result<(), CaptureError> {
             "--test-views" => config.test_views = number(value()?)?,
             "--size" => config.size = number(value()?)?,
             "--seed" => config.seed = number(value()?)? as u64,
-            "--noise" => config.noise = if value()? == "d435" { Noise::D435 } else { Noise::None },
+            "--noise" => {
+                config.noise = serde_json::from_value(value()?.into()).map_err(|e| usage(format!("--noise: {e}")))?
+            }
             "--occluders" => config.occluders = 0.25,
+            "--world" => config.world = serde_json::from_str(&value()?).map_err(|e| usage(format!("--world: {e}")))?,
             "--walk" => config.same_cameras = false,
             "--range" => {
                 let text = value()?;

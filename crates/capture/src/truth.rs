@@ -5,7 +5,7 @@
 //! name>.png` (part id + 1).
 
 use crate::{CaptureError, recording::images};
-use hingecast_geom::{Camera, KinematicTree, TriMesh};
+use hingecast_geom::{Camera, KinematicTree, Pose, TriMesh};
 use serde::{Deserialize, Serialize};
 use std::path::{Path, PathBuf};
 
@@ -26,9 +26,17 @@ pub struct Truth {
     pub n_states: usize,
     /// Joint limits of the source file, one pair a joint.
     pub source_limits: Vec<[f64; 2]>,
-    /// Exact cameras, one a frame of `transforms.json` in order (the recording's own may carry
-    /// noise).
+    /// Exact cameras in the true world, one a frame of `transforms.json` in order (the recording's
+    /// own may carry noise, or count in a frame of their state's own).
     pub cameras: Vec<Camera>,
+    /// Where the object as a whole stands in each state, held-out states last: part i is at
+    /// `world_from_object[s] * tree.poses_at(s)[i]`. Empty: it is never pushed.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub world_from_object: Vec<Pose>,
+    /// The frame of reference in which the recording states the cameras of each state, from the true
+    /// world. Empty: the true world in all states.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub recording_from_world: Vec<Pose>,
 }
 
 impl Truth {
@@ -55,6 +63,16 @@ impl Truth {
         let mut name = recording.file_name().unwrap_or_default().to_os_string();
         name.push(".truth");
         recording.with_file_name(name)
+    }
+
+    /// Where the object as a whole stands in `state`.
+    pub fn world_from_object_at(&self, state: usize) -> Pose {
+        self.world_from_object.get(state).copied().unwrap_or_default()
+    }
+
+    /// From the true world to the frame in which the recording states the cameras of `state`.
+    pub fn recording_from_world_at(&self, state: usize) -> Pose {
+        self.recording_from_world.get(state).copied().unwrap_or_default()
     }
 
     /// Surfaces of the parts in canonical world pose; index = part id.

@@ -1,13 +1,16 @@
 //! The flags. Units and defaults are in the help texts.
 
 mod studies;
+mod world;
 
 use clap::builder::{PossibleValuesParser, TypedValueParser};
 use clap::{Args, Parser, Subcommand};
 use hingecast::config::{Method, Preset};
 use hingecast::import_object::ImportConfig;
+use hingecast_capture::synth::Noise;
 use std::path::PathBuf;
 pub use studies::{Bench, Demos, Experiment, Rollout, Train};
+pub use world::WorldSettings;
 
 /// What a newcomer types first.
 const EXAMPLES: &str = "\
@@ -133,9 +136,11 @@ pub struct SynthSettings {
     #[arg(long, default_value_t = 256, value_name = "PIXELS")]
     pub size: usize,
     /// Sensor model: `none` is exact; `d435` has depth noise, holes, colour noise, ragged masks and
-    /// poses off by 0.5 deg and 3 mm.
-    #[arg(long, default_value = "none", value_parser = ["none", "d435"])]
-    pub noise: String,
+    /// poses off by 0.5 deg and 3 mm. `stereo` (blotches of 8 to 20 pixels, 3 mm at 1 m, growing with
+    /// the square; holes) and `tof` (smooth, pixels that fly at edges, dark and steep surfaces too far
+    /// by some mm) change depth and colour alone.
+    #[arg(long, default_value = "none", value_parser = words::<Noise>(&["none", "d435", "stereo", "tof"]))]
+    pub noise: Noise,
     /// A hand and forearm reach in on this share of the training frames [default without a value:
     /// 0.2].
     #[arg(long, value_name = "SHARE", num_args = 0..=1, default_missing_value = "0.2")]
@@ -149,6 +154,8 @@ pub struct SynthSettings {
     /// [default: what it can do].
     #[arg(long = "range", value_name = "JOINT=FROM:TO")]
     pub ranges: Vec<String>,
+    #[command(flatten)]
+    pub world: WorldSettings,
 }
 
 #[derive(Args, Debug)]

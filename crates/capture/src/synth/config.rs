@@ -1,5 +1,6 @@
 //! What to record, and what came of it.
 
+use super::world::World;
 use crate::CaptureError;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
@@ -18,11 +19,12 @@ pub struct SynthConfig {
     /// Held-out joint configurations between recorded ones; their frames are all test frames. 0
     /// with fewer than 3 states.
     pub test_states: usize,
-    /// Width and height of the images, pixels.
+    /// Width and height of the images, pixels; `world.lens` overrules this and `fov_deg`.
     pub size: usize,
     /// Field of view, degrees; 40 is a phone's main camera upright.
     pub fov_deg: f64,
-    /// The same cameras for all states (a rig); false: a person walks around anew for each state.
+    /// The same cameras for all states (a rig); false: a person walks around anew for each state, as
+    /// on a `Trajectory::Walk` always.
     pub same_cameras: bool,
     /// Joint name -> first and last value of its play, radians or scene units. Others get their
     /// useful range.
@@ -36,6 +38,9 @@ pub struct SynthConfig {
     /// A recording of play: in every training frame hands hold the parts that move, and move along;
     /// `time` runs. Instead of `occluders`.
     pub play: bool,
+    /// What stands around the object, and what happens to it and to the recording.
+    #[serde(skip_serializing_if = "World::is_default")]
+    pub world: World,
     /// Write the truth folder beside the recording.
     pub truth: bool,
     /// Of everything random: the same seed gives the same recording.
@@ -57,6 +62,7 @@ impl Default for SynthConfig {
             noise: Noise::None,
             occluders: 0.0,
             play: false,
+            world: World::default(),
             truth: true,
             seed: 0,
         }
@@ -70,8 +76,12 @@ pub enum Noise {
     /// A perfect sensor.
     #[default]
     None,
-    /// Intel RealSense D435: see `noise.rs`.
+    /// Intel RealSense D435, with the ragged masks and poses around it: see `noise/d435.rs`.
     D435,
+    /// Depth of a stereo camera as neighbouring pixels share its errors, and colour noise.
+    Stereo,
+    /// Depth of a time-of-flight sensor (a phone's LiDAR), and colour noise.
+    Tof,
 }
 
 /// What was recorded.
@@ -96,6 +106,14 @@ pub(super) fn validate(c: &SynthConfig) -> Result<(), CaptureError> {
         ((8..=4096).contains(&c.size), "size", c.size.to_string(), "8 to 4096 pixels"),
         (c.fov_deg > 5.0 && c.fov_deg < 120.0, "fov_deg", c.fov_deg.to_string(), "5 to 120 degrees"),
         ((0.0..=1.0).contains(&c.occluders), "occluders", c.occluders.to_string(), "a share from 0 to 1"),
+        (
+            c.world.lens.is_none_or(|l| l.is_sane()),
+            "lens",
+            format!("{:?}", c.world.lens),
+            "8 to 4096 pixels, 5 to 120 degrees, cx and cy near the middle",
+        ),
+        (drift_is_sane(c), "drift", format!("{:?}", c.world.drift), "0 to 45 degrees, 0 mm or more"),
+        (push_is_sane(c), "push", format!("{:?}", c.world.push), "finite mm and degrees, in states from 1 to the last"),
         (!(c.play && c.occluders > 0.0), "occluders", c.occluders.to_string(), "0 with play: hands are in all frames"),
     ];
     match checks.into_iter().find(|(good, ..)| !good) {
@@ -104,4 +122,15 @@ pub(super) fn validate(c: &SynthConfig) -> Result<(), CaptureError> {
             Err(CaptureError::new(format!("{key} is out of range"), format!("synth: {key} = {value}"), hint))
         }
     }
+}
+
+fn push_is_sane(c: &SynthConfig) -> bool {
+    c.world.push.as_ref().is_none_or(|p| {
+        let finite = p.mm.is_finite() && p.deg.is_finite();
+        finite && c.states > 1 && p.states.iter().all(|s| (1..c.states).contains(s))
+    })
+}
+
+fn drift_is_sane(c: &SynthConfig) -> bool {
+    c.world.drift.is_none_or(|d| (0.0..=45.0).contains(&d.deg) && d.mm >= 0.0 && d.mm.is_finite())
 }

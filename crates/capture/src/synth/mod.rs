@@ -2,11 +2,12 @@
 //!
 //! Cameras stand on the upper hemisphere; joints are played as a person would (see `play`); colour
 //! is supersampled, depth and masks are exact at pixel centres. Everything is a function of the
-//! object, the configuration and its seed.
+//! object, the configuration and its seed. `world` is what stands around the object.
 
 mod cameras;
 mod config;
 mod coupled;
+mod drift;
 mod noise;
 mod occluder;
 mod output;
@@ -17,24 +18,29 @@ mod ranges;
 mod render;
 pub(crate) mod scene;
 mod shade;
+mod smooth;
 mod staging;
 mod still;
+mod trajectory;
+mod world;
 
 pub use config::{Noise, SynthConfig, SynthReport};
 pub use coupled::useful_ranges;
 pub use ranges::UsefulRange;
 pub(crate) use staging::Staging;
 pub use staging::may_be_replaced;
+pub use world::{Drift, Frames, Lens, Masks, Push, Scenery, Trajectory, World};
 
 use crate::object::{ArticulatedObject, PartGeometry};
 use crate::{CaptureError, Frame, Recording, Split, Truth};
 use glam::{DVec3, Vec3};
-use hingecast_geom::{Pose, Progress};
+use hingecast_geom::{Camera, Pose, Progress};
 use output::Exposure;
 use plan::Shot;
 use rayon::prelude::*;
 use std::path::Path;
 use std::sync::atomic::{AtomicUsize, Ordering};
+use world::{Placement, Room, Site};
 
 /// Sensors and hands have sizes in metres. An object without metric scale counts as this large (its
 /// diagonal), a small piece of furniture.
@@ -57,8 +63,11 @@ pub fn synth(
     let truth_out = Truth::folder_of(&out);
     let work = Staging::new(&out)?;
     let truth_work = config.truth.then(|| Staging::new(&truth_out)).transpose()?;
-    for folder in ["rgb", "depth", "mask", "occluder"] {
-        if folder != "occluder" || config.play || config.occluders > 0.0 {
+    let hands = config.play || config.occluders > 0.0;
+    for (folder, wanted) in
+        [("rgb", true), ("depth", true), ("mask", config.world.masks != Masks::None), ("occluder", hands)]
+    {
+        if wanted {
             work.folder(folder)?;
         }
     }
@@ -69,8 +78,17 @@ pub fn synth(
 
     let ranges = plan::ranges(object, config)?;
     let states = plan::joint_values(object, config, &ranges);
-    let shots = plan::shots(object, config, &states);
     let metres_per_unit = if object.metric { 1.0 } else { ASSUMED_DIAGONAL_METRES / object.diagonal().max(1e-9) };
+    let front = world::front(object, &ranges);
+    let placement = Placement::new(object, config, &plan::times(config), front, metres_per_unit);
+    let site = (config.world.scene == Scenery::Room)
+        .then(|| Site::new(object, &states, &placement, front, 1.0 / metres_per_unit, config.seed));
+    let shots = plan::shots(object, config, &states, &placement, front, site.as_ref());
+    let room = site.as_ref().map(|site| {
+        let cameras: Vec<Camera> = shots.iter().map(|s| s.camera).collect();
+        // The material after the object's own is that of hands.
+        Room::new(site, &cameras, object.materials.len() as u32 + 1, config.seed)
+    });
     let studio = Studio {
         object,
         config,
@@ -80,7 +98,9 @@ pub fn synth(
             config.background.map(|c| crate::object::texture::linear_from_srgb(f32::from(c) / 255.0)),
         ),
         metres_per_unit,
-        depth_scale: plan::depth_scale(object, &shots),
+        depth_scale: plan::depth_scale(object, &shots, room.as_ref().map_or(&[], |r| &r.geometry.vertices)),
+        room: room.as_ref(),
+        placement: &placement,
         root: &work.path,
         truth: truth_work.as_ref().map(|t| t.path.as_path()),
     };
@@ -105,7 +125,7 @@ pub fn synth(
     };
     recording.write()?;
     if let Some(truth) = truth_work {
-        output::write_truth(object, config, &ranges, &states, &shots, &truth.path)?;
+        output::write_truth(object, config, &ranges, &states, &shots, &placement, &truth.path)?;
         truth.finish()?;
     }
     work.finish()?;
@@ -114,7 +134,7 @@ pub fn synth(
         recording: out,
         truth: config.truth.then_some(truth_out),
         frames: shots.len(),
-        notes: still::notes(object, &ranges, &shots),
+        notes: still::notes(object, &states[..config.states], &shots),
         ranges: names.zip(ranges.iter().map(|r| [r.lower, r.upper])).collect(),
     })
 }
@@ -126,6 +146,8 @@ struct Studio<'a> {
     states: &'a [Vec<f64>],
     /// The hands of a play; none otherwise.
     held: Vec<player::Hand>,
+    room: Option<&'a Room>,
+    placement: &'a Placement,
     /// Linear light.
     background: Vec3,
     metres_per_unit: f64,
@@ -143,18 +165,24 @@ impl Studio<'_> {
         shots: &[&Shot],
         tell: &(dyn Fn() -> Result<(), CaptureError> + Sync),
     ) -> Result<Vec<Frame>, CaptureError> {
-        let mut poses = self.object.tree.poses(&self.states[state]);
-        let scene = scene::Scene::new(self.object.parts.iter().zip(poses.iter().copied()));
+        let n_parts = self.object.parts.len();
+        let mut poses = self.placement.part_poses(self.object, &self.states[state], state);
+        let bodies = self.object.parts.iter().chain(self.room.map(|r| &r.geometry));
+        let bodies = || bodies.clone().zip(poses.iter().copied().chain([Pose::IDENTITY]));
+        let scene = scene::Scene::new(bodies());
         let reaching = (self.config.occluders > 0.0)
             .then(|| occluder::hand(self.object, self.states, state, self.metres_per_unit, self.config.seed));
         let holding = self.held.iter().filter(|h| h.states.contains(&state)).map(|h| (&h.geometry, poses[h.part]));
         let hands: Vec<(&PartGeometry, Pose)> =
-            holding.chain(reaching.as_ref().map(|hand| (hand, Pose::IDENTITY))).collect();
+            holding.chain(reaching.as_ref().map(|hand| (hand, self.placement.of_object(state)))).collect();
         let share = if self.config.play { 1.0 } else { self.config.occluders };
-        let looks = shade::Looks::new(self.object, hands.iter().map(|h| h.0));
-        let with_hands = (!hands.is_empty()).then(|| {
-            let parts = self.object.parts.iter().zip(poses.iter().copied());
-            scene::Scene::new(parts.chain(hands.iter().copied()))
+        let looks = shade::Looks::new(self.object, self.room, hands.iter().map(|h| h.0));
+        let with_hands = (!hands.is_empty()).then(|| scene::Scene::new(bodies().chain(hands.iter().copied())));
+        poses.extend(self.room.map(|_| Pose::IDENTITY));
+        let drifted = self.config.world.drift.map_or(Vec::new(), |size| {
+            let seed = self.config.seed ^ 0x6472_6966_7400 ^ ((state as u64) << 48);
+            let mut rng = fastrand::Rng::with_seed(seed.wrapping_mul(0x9e37_79b9_7f4a_7c15));
+            drift::along(self.config.views, &size, 1e-3 / self.metres_per_unit, &mut rng)
         });
         poses.extend(hands.iter().map(|h| h.1));
         shots
@@ -167,14 +195,26 @@ impl Studio<'_> {
                 let reached = train && rng.f64() < share;
                 let seen = if reached { with_hands.as_ref().unwrap_or(&scene) } else { &scene };
                 let picture = render::render(seen, &looks, &poses, &shot.camera, self.background);
-                let mut exposure = Exposure::new(picture, self.object.parts.len(), shot.camera.width);
+                let around = usize::from(self.room.is_some());
+                let mut exposure = Exposure::new(picture, n_parts, around, shot.camera.width);
                 if reached {
-                    exposure.note_hidden(&scene, &shot.camera);
+                    exposure.note_hidden(&scene, n_parts, &shot.camera);
                 }
                 let mut camera = shot.camera;
-                if train && self.config.noise == Noise::D435 {
-                    noise::d435(&mut exposure, &mut camera, self.metres_per_unit, &mut rng);
+                let segmented = (train && self.config.world.masks == Masks::Sam).then(|| {
+                    let mut mask = exposure.mask.clone();
+                    let mut rng = fastrand::Rng::with_seed((seed ^ 0x7361_6d).wrapping_mul(0x9e37_79b9_7f4a_7c15));
+                    world::masks::segmenter(&mut mask, camera.width, camera.height, &mut rng);
+                    mask
+                });
+                if train {
+                    noise::sense(self.config.noise, &mut exposure, &mut camera, self.metres_per_unit, &mut rng);
+                    camera = drifted.get(shot.view).map_or(camera, |off| drift::stated(camera, *off));
                 }
+                if let Some(mask) = segmented {
+                    exposure.mask = mask;
+                }
+                let camera = self.placement.stated(camera, state);
                 let mut frame = output::write(shot, camera, &exposure, self.depth_scale, self.root, self.truth)?;
                 frame.time = (self.config.play && train).then_some(state as f64 * player::SECS_PER_STATE);
                 tell()?;

@@ -5,6 +5,7 @@ use super::plan::Shot;
 use super::ranges::UsefulRange;
 use super::render::{Picture, centre_ray};
 use super::scene::Scene;
+use super::world::Placement;
 use crate::object::ArticulatedObject;
 use crate::recording::images;
 use crate::{CaptureError, Frame, Truth};
@@ -30,10 +31,12 @@ pub(crate) struct Exposure {
 }
 
 impl Exposure {
-    /// `n_parts` of the object; a part beyond them is the hand.
-    pub fn new(picture: Picture, n_parts: usize, width: usize) -> Self {
-        let is_hand = |p: u8| usize::from(p) > n_parts;
-        let labels: Vec<u8> = picture.part.iter().map(|&p| if is_hand(p) { 0 } else { p }).collect();
+    /// `n_parts` of the object, then `n_around` of what stands around it; a part beyond them is a
+    /// hand.
+    pub fn new(picture: Picture, n_parts: usize, n_around: usize, width: usize) -> Self {
+        let is_hand = |p: u16| usize::from(p) > n_parts + n_around;
+        let own = |p: u16| if usize::from(p) > n_parts { 0 } else { p as u8 };
+        let labels: Vec<u8> = picture.part.iter().map(|&p| own(p)).collect();
         let height = picture.part.len() / width.max(1);
         let near = |k: usize, end: usize| k.saturating_sub(1)..(k + 2).min(end);
         let tinted = |i: usize| {
@@ -51,12 +54,12 @@ impl Exposure {
     }
 
     /// Marks the frame as occluded when the hand hides most of the object. `bare` is the scene
-    /// without the hand.
-    pub fn note_hidden(&mut self, bare: &Scene, camera: &Camera) {
+    /// without the hand, in which the object has `n_parts`.
+    pub fn note_hidden(&mut self, bare: &Scene, n_parts: usize, camera: &Camera) {
         let Some(hand) = &self.occluder else { return };
         let hits = |i: usize| {
             let (origin, direction) = centre_ray(camera, i % camera.width, i / camera.width);
-            bare.cast(origin, direction, f32::INFINITY).is_some()
+            bare.cast(origin, direction, f32::INFINITY).is_some_and(|hit| hit.part < n_parts)
         };
         let hidden = (0..hand.len()).filter(|&i| hand[i] > 0 && hits(i)).count() as f64;
         let visible = self.labels.iter().filter(|&&p| p > 0).count() as f64;
@@ -64,7 +67,8 @@ impl Exposure {
     }
 }
 
-/// Writes the images of a shot; `camera` is the one that the recording will state.
+/// Writes the images of a shot; `camera` is the one that the recording will state. Without a folder
+/// for masks, there are none.
 pub(super) fn write(
     shot: &Shot,
     camera: Camera,
@@ -80,7 +84,10 @@ pub(super) fn write(
     let per_unit = 1.0 / depth_scale;
     let units: Vec<u16> = e.depth.iter().map(|&z| (f64::from(z) * per_unit).round() as u16).collect();
     images::write_depth(&file("depth"), &units, w, h)?;
-    images::write_gray(&file("mask"), &e.mask, w, h)?;
+    let mask = root.join("mask").is_dir().then(|| file("mask"));
+    if let Some(mask) = &mask {
+        images::write_gray(mask, &e.mask, w, h)?;
+    }
     if let Some(hand) = &e.occluder {
         images::write_gray(&file("occluder"), hand, w, h)?;
     }
@@ -95,7 +102,7 @@ pub(super) fn write(
         color: file("rgb"),
         depth: Some(file("depth")),
         depth_scale,
-        mask: Some(file("mask")),
+        mask,
         occluded: e.occluded,
         occluder_mask: e.occluder.as_ref().map(|_| file("occluder")),
         time: None,
@@ -108,6 +115,7 @@ pub(super) fn write_truth(
     ranges: &[UsefulRange],
     states: &[Vec<f64>],
     shots: &[Shot],
+    placement: &Placement,
     root: &Path,
 ) -> Result<(), CaptureError> {
     let mut tree = object.tree.clone();
@@ -127,6 +135,8 @@ pub(super) fn write_truth(
         n_states: config.states,
         source_limits: object.tree.joints.iter().map(|j| j.limits).collect(),
         cameras: shots.iter().map(|s| s.camera).collect(),
+        world_from_object: placement.world_from_object.clone(),
+        recording_from_world: placement.recording_from_world.clone(),
     };
     truth.write()
 }

@@ -1,11 +1,13 @@
 //! Which joint values and which cameras a recording has.
 
+use super::cameras::Optics;
 use super::coupled::{self, useful_ranges};
 use super::ranges::UsefulRange;
-use super::{SynthConfig, cameras, play};
+use super::world::{Placement, Site, Trajectory};
+use super::{SynthConfig, cameras, play, trajectory};
 use crate::object::ArticulatedObject;
 use crate::{CaptureError, Split};
-use glam::DVec3;
+use glam::{DVec3, Vec3};
 use hingecast_geom::Camera;
 
 /// One view to render.
@@ -46,53 +48,71 @@ pub(super) fn ranges(object: &ArticulatedObject, config: &SynthConfig) -> Result
     Ok(useful)
 }
 
+/// When each state is recorded, in numbers of recorded states; held-out ones stand half-way between
+/// two recorded ones, spread over the play.
+pub(super) fn times(config: &SynthConfig) -> Vec<f64> {
+    let last = (config.states.max(2) - 1) as f64;
+    let held_out = if config.states < 3 { 0 } else { config.test_states };
+    let between = (0..held_out).map(|k| (last * (k + 1) as f64 / (held_out + 1) as f64).floor() + 0.5);
+    (0..config.states).map(|s| s as f64).chain(between).collect()
+}
+
 /// Joint values of the recorded states, then of the held-out ones between them.
 pub(super) fn joint_values(object: &ArticulatedObject, config: &SynthConfig, ranges: &[UsefulRange]) -> Vec<Vec<f64>> {
     let mut rng = fastrand::Rng::with_seed(config.seed ^ 0x706c_6179);
     let behind: Vec<bool> = ranges.iter().map(|r| r.behind).collect();
     let play = play::Play::new(&behind, config.states == 2, &mut rng);
     let last = (config.states.max(2) - 1) as f64;
-    let held_out = if config.states < 3 { 0 } else { config.test_states };
-    // Held-out states stand half-way between two recorded ones, spread over the play.
-    let between = (0..held_out).map(|k| (last * (k + 1) as f64 / (held_out + 1) as f64).floor() + 0.5);
-    let times = (0..config.states).map(|s| s as f64).chain(between).map(|s| s / last);
     let value = |(f, r): (f64, &UsefulRange)| r.lower + f * (r.upper - r.lower);
     let at = |t: f64| {
         let mut q: Vec<f64> = play.fractions(t).into_iter().zip(ranges).map(value).collect();
         object.tree.follow(&mut q);
         q
     };
-    times.map(at).collect()
+    times(config).into_iter().map(|s| at(s / last)).collect()
 }
 
-/// All views: per state the training cameras, then the held-out ones.
-pub(super) fn shots(object: &ArticulatedObject, config: &SynthConfig, states: &[Vec<f64>]) -> Vec<Shot> {
-    let fov = config.fov_deg.to_radians();
-    let subject = cameras::Subject::new(object, states);
-    let directions = |salt: u64, n: usize| {
-        cameras::directions(n, &mut fastrand::Rng::with_seed(config.seed.wrapping_mul(0x9e37_79b9) ^ salt))
+/// All views: per state the training cameras, then the held-out ones. `front`: towards which the
+/// object opens.
+pub(super) fn shots(
+    object: &ArticulatedObject,
+    config: &SynthConfig,
+    states: &[Vec<f64>],
+    placement: &Placement,
+    front: DVec3,
+    site: Option<&Site>,
+) -> Vec<Shot> {
+    let optics = match config.world.lens {
+        Some(lens) => Optics::of(lens),
+        None => Optics::square(config.size, config.fov_deg.to_radians()),
     };
+    let subject = cameras::Subject::new(object, states, placement);
+    let way = config.world.trajectory;
+    let stands = |salt: u64, n: usize| {
+        let mut rng = fastrand::Rng::with_seed(config.seed.wrapping_mul(0x9e37_79b9) ^ salt);
+        trajectory::stands(way, n, front, site, &mut rng)
+    };
+    let rig = config.same_cameras && way != Trajectory::Walk;
     let per_state = |state: usize| {
-        let salt = if config.same_cameras { 0 } else { state as u64 };
-        let train = if state < config.states { directions(salt, config.views) } else { Vec::new() };
-        (train, directions(1_000_003 + state as u64, config.test_views))
+        let salt = if rig { 0 } else { state as u64 };
+        let train = if state < config.states { stands(salt, config.views) } else { Vec::new() };
+        (train, stands(1_000_003 + state as u64, config.test_views))
     };
     let all: Vec<_> = (0..states.len()).map(per_state).collect();
-    let every: Vec<DVec3> = all.iter().flat_map(|(train, test)| train.iter().chain(test).copied()).collect();
-    let distance = subject.distance(&every, fov);
+    let distance = subject.distance(all.iter().flat_map(|(train, test)| train.iter().chain(test)), &optics);
     let mut shots = Vec::new();
     for (state, (train, test)) in all.iter().enumerate() {
-        let splits = train.iter().map(|d| (Split::Train, d)).chain(test.iter().map(|d| (Split::Test, d)));
-        for (view, (split, &direction)) in splits.enumerate() {
-            let camera = subject.camera(direction, distance, config.size, fov);
-            shots.push(Shot { state, view, split, camera });
+        let splits = train.iter().map(|s| (Split::Train, s)).chain(test.iter().map(|s| (Split::Test, s)));
+        for (view, (split, stand)) in splits.enumerate() {
+            shots.push(Shot { state, view, split, camera: subject.camera(stand, distance, &optics) });
         }
     }
     shots
 }
 
-/// Scene units per depth step: a ten-thousandth unless the object is too far for 16 bits.
-pub(super) fn depth_scale(object: &ArticulatedObject, shots: &[Shot]) -> f64 {
+/// Scene units per depth step: a ten-thousandth unless the object, or the `surroundings` (points of
+/// the world), are too far for 16 bits.
+pub(super) fn depth_scale(object: &ArticulatedObject, shots: &[Shot], surroundings: &[Vec3]) -> f64 {
     let (lo, hi) = object.bounds(&vec![0.0; object.tree.joints.len()]);
     let centre = 0.5 * (lo + hi);
     let farthest =
@@ -104,6 +124,11 @@ pub(super) fn depth_scale(object: &ArticulatedObject, shots: &[Shot]) -> f64 {
     // Small objects (a pair of glasses in metres) deserve finer steps.
     while farthest / (scale / 10.0) < 65_535.0 {
         scale /= 10.0;
+    }
+    let z = |s: &Shot, x: &Vec3| s.camera.camera_from_world.apply(x.as_dvec3()).z;
+    let around = shots.iter().flat_map(|s| surroundings.iter().map(move |x| z(s, x))).fold(0.0, f64::max);
+    while around / scale > 65_535.0 {
+        scale *= 2.0;
     }
     scale
 }

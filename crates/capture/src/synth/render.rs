@@ -11,7 +11,7 @@ use hingecast_geom::{Camera, Pose};
 pub(crate) struct Picture {
     pub rgb: Vec<u8>,
     pub depth: Vec<f32>,
-    pub part: Vec<u8>,
+    pub part: Vec<u16>,
 }
 
 /// Colour samples per pixel side: everywhere, and in pixels that hold an edge. Print needs no finer
@@ -71,7 +71,7 @@ pub(crate) fn render(scene: &Scene, looks: &Looks, poses: &[Pose], camera: &Came
             let i = y * w + x;
             if let (Some(hit), _) = cast(x as f32 + 0.5, y as f32 + 0.5) {
                 out.depth[i] = hit.t;
-                out.part[i] = hit.part as u8 + 1;
+                out.part[i] = hit.part as u16 + 1;
             }
             let (mut c, edge) = mean(x, y, COARSE);
             if edge {

@@ -6,6 +6,8 @@
 
 use super::occluder;
 use super::scene::Hit;
+use super::world::Room;
+use crate::object::texture::Texture;
 use crate::object::{ArticulatedObject, Material, PartGeometry};
 use glam::{Vec2, Vec3, Vec3A};
 
@@ -15,12 +17,12 @@ const GROUND: f32 = 0.42;
 const SKY: f32 = 0.58;
 const LAMPS: [([f32; 3], f32); 2] = [([0.48, -0.36, 0.80], 0.28), ([-0.74, 0.56, 0.37], 0.12)];
 
-/// What shading needs: the parts (hands may follow the object's own), materials, and per face how
-/// many texels a unit of length covers, for the mip level.
+/// What shading needs: the parts (a room and hands may follow the object's own), materials, and per
+/// face how many texels a unit of length covers, for the mip level.
 pub(crate) struct Looks<'a> {
-    object: &'a ArticulatedObject,
     parts: Vec<&'a PartGeometry>,
     materials: Vec<Material>,
+    textures: Vec<&'a Texture>,
     /// Linear-light colour per material.
     colors: Vec<Vec3>,
     /// log2 of texels per scene unit, per part and face.
@@ -28,19 +30,29 @@ pub(crate) struct Looks<'a> {
 }
 
 impl<'a> Looks<'a> {
-    pub fn new(object: &'a ArticulatedObject, hands: impl IntoIterator<Item = &'a PartGeometry>) -> Self {
+    pub fn new(
+        object: &'a ArticulatedObject,
+        room: Option<&'a Room>,
+        hands: impl IntoIterator<Item = &'a PartGeometry>,
+    ) -> Self {
         let linear =
             |c: [f32; 3]| Vec3::from_array(c.map(|x| crate::object::texture::linear_from_srgb(x.clamp(0.0, 1.0))));
-        let parts: Vec<&PartGeometry> = object.parts.iter().chain(hands).collect();
+        let parts: Vec<&PartGeometry> = object.parts.iter().chain(room.map(|r| &r.geometry)).chain(hands).collect();
         let mut materials = object.materials.clone();
         materials.push(Material { color: occluder::SKIN, texture: None });
+        let mut textures: Vec<&Texture> = object.textures.iter().collect();
+        if let Some(room) = room {
+            let after = |m: &Material| Material { texture: m.texture.map(|t| t + textures.len()), ..*m };
+            materials.extend(room.materials.iter().map(after));
+            textures.extend(&room.textures);
+        }
         let colors = materials.iter().map(|m| linear(m.color)).collect();
         let density = parts
             .iter()
             .map(|p| {
                 let of_face = |(f, &m): (&[u32; 3], &u32)| {
                     let Some(texture) = materials[m as usize].texture else { return 0.0 };
-                    let size = object.textures[texture].size();
+                    let size = textures[texture].size();
                     let [a, b, c] = f.map(|i| p.uvs[i as usize] * size);
                     let texels = (b - a).perp_dot(c - a).abs();
                     let [a, b, c] = f.map(|i| p.vertices[i as usize]);
@@ -50,7 +62,7 @@ impl<'a> Looks<'a> {
                 p.faces.iter().zip(&p.materials).map(of_face).collect()
             })
             .collect();
-        Self { object, parts, materials, colors, density }
+        Self { parts, materials, textures, colors, density }
     }
 
     /// Same part, same material.
@@ -70,7 +82,7 @@ impl<'a> Looks<'a> {
         if let Some(texture) = self.materials[material].texture {
             let uv = corners.iter().zip(weights).fold(Vec2::ZERO, |sum, (&i, w)| sum + part.uvs[i] * w);
             let level = self.density[hit.part][hit.face] + footprint.log2();
-            albedo *= self.object.textures[texture].sample(uv, level);
+            albedo *= self.textures[texture].sample(uv, level);
         }
         // Both sides are lit alike: the normal faces the camera.
         let facing = if hit.normal.dot(direction) > 0.0 { -hit.normal } else { hit.normal };

@@ -2,7 +2,8 @@
 #![allow(dead_code)]
 
 use hingecast_capture::object::ArticulatedObject;
-use hingecast_capture::synth::{SynthConfig, SynthReport, synth};
+use hingecast_capture::synth::{SynthConfig, SynthReport, World, synth};
+use hingecast_capture::{Recording, Truth};
 use hingecast_geom::Progress;
 use std::path::{Path, PathBuf};
 
@@ -29,6 +30,17 @@ pub fn small() -> SynthConfig {
 /// A small recording of the hinged box in `dir/rec`.
 pub fn record(dir: &Path, config: &SynthConfig) -> SynthReport {
     synth(&hinged_box(dir), config, &dir.join("rec"), &Progress::default()).unwrap()
+}
+
+/// The hinged box in a world.
+pub fn with(world: World) -> SynthConfig {
+    SynthConfig { world, ..small() }
+}
+
+/// A recording of the hinged box and its truth.
+pub fn made(dir: &Path, config: &SynthConfig) -> (Recording, Truth) {
+    let report = record(dir, config);
+    (Recording::open(&report.recording).unwrap(), Truth::open(&report.truth.unwrap()).unwrap())
 }
 
 /// The real objects, when they are at hand.

@@ -3,7 +3,7 @@
 use super::{Outcome, Session};
 use crate::cli::{Synth, SynthSettings};
 use hingecast::failure::{Failure, Result};
-use hingecast_capture::synth::{Noise, SynthConfig};
+use hingecast_capture::synth::SynthConfig;
 use std::collections::BTreeMap;
 
 pub fn config(settings: &SynthSettings, seed: u64, truth: bool) -> Result<SynthConfig> {
@@ -27,9 +27,10 @@ pub fn config(settings: &SynthSettings, seed: u64, truth: bool) -> Result<SynthC
         views: settings.views,
         test_views: settings.test_views,
         size: settings.size,
-        noise: if settings.noise == "d435" { Noise::D435 } else { Noise::None },
+        noise: settings.noise,
         occluders: settings.occluders.unwrap_or(0.0),
         play: settings.play,
+        world: settings.world.world(),
         ranges,
         truth,
         seed,
