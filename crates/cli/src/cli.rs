@@ -153,12 +153,13 @@ pub struct SynthSettings {
 
 #[derive(Args, Debug)]
 pub struct Import {
-    /// Folder of the recording to convert.
-    pub source: PathBuf,
+    /// Folder of the recording to convert. Several: one state each, in this order.
+    #[arg(required = true, value_name = "SOURCE")]
+    pub sources: Vec<PathBuf>,
     /// Recording folder to write.
     #[arg(long, short)]
     pub out: PathBuf,
-    /// Layout of the source: auto, nerfstudio, artgs, dta, paris, screwsplat or dynamic3dgs.
+    /// Layout of the sources: auto, nerfstudio, artgs, dta, paris, screwsplat or dynamic3dgs.
     #[arg(long, default_value = "auto")]
     pub format: String,
 }

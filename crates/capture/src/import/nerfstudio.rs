@@ -16,7 +16,8 @@ const MOST_STATES: usize = 64;
 /// With fewer pictures a time than this, the times are those of a film, too.
 const LEAST_VIEWS: usize = 3;
 
-pub(super) fn read(src: &Path) -> Result<Source, CaptureError> {
+/// `one_state`: the source is one of several; a film is then one state.
+pub(super) fn read(src: &Path, one_state: bool) -> Result<Source, CaptureError> {
     let single = if src.is_file() { src.to_path_buf() } else { src.join("transforms.json") };
     let documents: Vec<Document> = if single.is_file() {
         vec![transforms::parse(src, &single, DefaultState::Is(0))?]
@@ -30,7 +31,11 @@ pub(super) fn read(src: &Path) -> Result<Source, CaptureError> {
             return Err(problem.error.clone());
         }
         let says_state = d.value["frames"].as_array().is_some_and(|f| f.iter().any(|f| f.get("state").is_some()));
-        let times = if says_state || documents.len() > 1 { BTreeMap::new() } else { states_by_time(d)? };
+        let times = match states_by_time(d) {
+            _ if says_state || documents.len() > 1 => BTreeMap::new(),
+            Err(_) if one_state => BTreeMap::new(),
+            times => times?,
+        };
         for e in &d.entries {
             let i = &e.intrinsics;
             let camera_from_world = camera_from_gl(&e.world_from_camera, &e.place)?;
@@ -53,7 +58,8 @@ pub(super) fn read(src: &Path) -> Result<Source, CaptureError> {
         }
     }
     let metric = documents.iter().any(|d| d.metric);
-    Ok(Source { shots, metric, up: documents.first().map_or(DVec3::Z, |d| d.up) })
+    let registered = documents.iter().all(|d| d.registered);
+    Ok(Source { shots, metric, up: documents.first().map_or(DVec3::Z, |d| d.up), registered, notes: Vec::new() })
 }
 
 /// States in the order of time, when there are few times. Keys are bit patterns: times >= 0 sort

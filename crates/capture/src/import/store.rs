@@ -46,6 +46,7 @@ pub(super) fn store(source: &Source, name: &str, out: &Path, progress: &Progress
         n_states: train_states,
         metric: source.metric,
         up: source.up,
+        registered: source.registered,
     };
     recording.write()?;
     // Folders that this source did not need; those with files refuse to go.
