@@ -28,7 +28,8 @@ fn verify(src: &Path, e: &Expect) -> Recording {
     let recording = Recording::open(&out).unwrap();
     for (i, f) in recording.frames.iter().enumerate() {
         let (uv, z) = f.camera.project(POINTS[f.state]);
-        let p = uv.y.floor() as usize * W + uv.x.floor() as usize;
+        let (w, h) = (f.camera.width, f.camera.height);
+        let p = uv.y.floor() as usize * w + uv.x.floor() as usize;
         let view = recording.load(i).unwrap();
         let [r, g, b] = [0, 1, 2].map(|c| view.rgb[3 * p + c]);
         assert!(r > 150 && g < 100 && b < 100, "state {} view {}: {r} {g} {b} at {uv}", f.state, f.view);
@@ -36,7 +37,7 @@ fn verify(src: &Path, e: &Expect) -> Recording {
             assert!((f64::from(view.depth[p]) - z).abs() < 2e-3, "{} {z}", view.depth[p]);
         }
         if e.mask {
-            let far = ((H as f64 - 1.0 - uv.y.floor()) as usize) * W + (W as f64 - 1.0 - uv.x.floor()) as usize;
+            let far = ((h as f64 - 1.0 - uv.y.floor()) as usize) * w + (w as f64 - 1.0 - uv.x.floor()) as usize;
             assert_eq!((view.mask[p], view.mask[far]), (1, 0));
         }
     }

@@ -6,6 +6,7 @@ use clap::builder::{PossibleValuesParser, TypedValueParser};
 use clap::{Args, Parser, Subcommand};
 use hingecast::config::{Method, Preset};
 use hingecast::import_object::ImportConfig;
+use hingecast_capture::import;
 use std::path::PathBuf;
 pub use studies::{Bench, Demos, Experiment, Rollout, Train};
 
@@ -162,6 +163,16 @@ pub struct Import {
     /// Layout of the sources: auto, nerfstudio, artgs, dta, paris, screwsplat or dynamic3dgs.
     #[arg(long, default_value = "auto")]
     pub format: String,
+    /// Pixels of less confidence lose their depth, where the source has confidence maps: 0 low, 1
+    /// medium, 2 high.
+    #[arg(long, default_value_t = import::Config::default().min_confidence, value_name = "LEVEL", value_parser = clap::value_parser!(u8).range(0..=2))]
+    pub min_confidence: u8,
+    /// Of a film, only every so many-th picture.
+    #[arg(long, default_value_t = import::Config::default().every, value_name = "N", value_parser = at_least_one)]
+    pub every: usize,
+    /// At most so many training pictures a state, evenly spread over what is there.
+    #[arg(long, default_value_t = import::Config::default().max_views, value_name = "N", value_parser = at_least_one)]
+    pub max_views: usize,
 }
 
 #[derive(Args, Debug)]

@@ -24,11 +24,13 @@ pub enum Format {
     Screwsplat,
     /// `train_meta.json`, `ims/`, `seg/`.
     Dynamic3dgs,
+    /// Record3D's "EXR + RGBD" or .r3d: `metadata.json`, `rgb/`, `depth/`; or `metadata`, `rgbd/`.
+    Record3d,
 }
 
 impl Format {
     /// Every format with its name on the command line.
-    pub const ALL: [(&'static str, Format); 7] = [
+    pub const ALL: [(&'static str, Format); 8] = [
         ("auto", Format::Auto),
         ("nerfstudio", Format::Nerfstudio),
         ("artgs", Format::Artgs),
@@ -36,6 +38,7 @@ impl Format {
         ("paris", Format::Paris),
         ("screwsplat", Format::Screwsplat),
         ("dynamic3dgs", Format::Dynamic3dgs),
+        ("record3d", Format::Record3d),
     ];
 
     /// Its name on the command line.
@@ -83,7 +86,7 @@ pub fn detect(src: &Path) -> Result<Format, CaptureError> {
     })
 }
 
-fn known(src: &Path) -> Option<Format> {
+pub(super) fn known(src: &Path) -> Option<Format> {
     let has = |name: &str| src.join(name).exists();
     let subfolders = subfolders(src);
     let any_sub = |name: &str| subfolders.iter().any(|p| p.join(name).exists());
@@ -97,6 +100,8 @@ fn known(src: &Path) -> Option<Format> {
         Some(Format::Dynamic3dgs)
     } else if any_sub("extrinsics") {
         Some(Format::Screwsplat)
+    } else if has("metadata.json") && has("rgb") || has("metadata") && has("rgbd") {
+        Some(Format::Record3d)
     } else if has("transforms.json") || any_sub("transforms.json") || src.is_file() {
         Some(Format::Nerfstudio)
     } else {

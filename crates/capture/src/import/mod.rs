@@ -1,35 +1,57 @@
 //! Other layouts of the field into native recordings.
 //!
-//! Each layout's file lists its pictures as `Shot`s; `store` decodes, undistorts, brings depth and
-//! mask to the colour's size and writes them. World frame and scale stay the source's; `join` puts
+//! Each layout's file lists its pictures as `Shot`s; `store` decodes, brings colour and mask to the
+//! size of the depth, undistorts and writes them. World frame and scale stay the source's; `join` puts
 //! several sources together, a state each.
 
 mod artgs;
 mod dta;
 mod dynamic3dgs;
 mod format;
+mod grid;
 mod join;
 mod lens;
 mod nerfstudio;
 mod numbers;
 mod paris;
+mod record3d;
+mod resize;
 mod screwsplat;
 mod store;
+mod thin;
+mod unpack;
 
 pub use format::{Format, detect};
 
 use crate::{CaptureError, Split};
 use glam::DVec3;
+use grid::Grid;
 use hingecast_geom::{Camera, Progress};
 use lens::Lens;
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
+use unpack::Scratch;
 
 /// What to import, and how much of it.
-#[derive(Clone, Debug, Default, PartialEq)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct Config {
     /// Layout of all sources; [`Format::Auto`] looks at each.
     pub format: Format,
+    /// Pixels of less confidence lose their depth, where the source has confidence maps: 0 low, 1
+    /// medium, 2 high (ARKit's scale).
+    pub min_confidence: u8,
+    /// Of each state, only every so many-th training picture; at least 1.
+    pub every: usize,
+    /// At most so many training pictures a state, evenly spread.
+    pub max_views: usize,
+}
+
+impl Default for Config {
+    /// ARKit's low confidence is depth it made up at edges. 120 views show a thing from all sides; a
+    /// film has thousands, which cost time and add no side.
+    fn default() -> Self {
+        Self { format: Format::Auto, min_confidence: 1, every: 1, max_views: 120 }
+    }
 }
 
 /// What was imported.
@@ -56,16 +78,40 @@ pub(crate) struct Shot {
     pub camera: Camera,
     pub lens: Lens,
     pub color: PathBuf,
-    pub depth: Option<PathBuf>,
+    /// May be smaller than the colour image.
+    pub depth: Option<Grid>,
     /// Scene units per stored unit; depths below `depth_least` (scene units) are invalid.
     pub depth_scale: f64,
     pub depth_least: f64,
+    /// Of the depth, pixel by pixel.
+    pub confidence: Option<Grid>,
     pub mask: MaskFrom,
     /// Pixels that a hand hides.
     pub occluder: Option<PathBuf>,
     /// The person hides the object.
     pub occluded: bool,
     pub time: Option<f64>,
+}
+
+impl Shot {
+    /// A training picture of the only state, without depth, its mask in its alpha.
+    pub fn of(camera: Camera, color: PathBuf) -> Self {
+        Self {
+            state: 0,
+            split: Split::Train,
+            camera,
+            lens: Lens::default(),
+            color,
+            depth: None,
+            depth_scale: 1e-3,
+            depth_least: 0.0,
+            confidence: None,
+            mask: MaskFrom::Alpha,
+            occluder: None,
+            occluded: false,
+            time: None,
+        }
+    }
 }
 
 /// All pictures of a source, and what it says about its world.
@@ -117,12 +163,24 @@ pub fn import<P: AsRef<Path>>(
 ) -> Result<ImportReport, CaptureError> {
     crate::synth::may_be_replaced(out)?;
     let several = sources.len() > 1;
+    let mut scratch = Scratch::new(out);
     let mut formats = Vec::new();
     let mut parts = Vec::new();
     for src in sources.iter().map(P::as_ref) {
         progress.check()?;
-        let format = if config.format == Format::Auto { detect(src)? } else { config.format };
-        let source = read(src, format, several)?;
+        let found = find(src, &mut scratch)?;
+        let read_it = || {
+            let format = if config.format == Format::Auto { detect(&found)? } else { config.format };
+            Ok((format, read(&found, format, several)?))
+        };
+        // Errors speak of the zip file, not of where it was unpacked.
+        let name_zip = |mut e: CaptureError| {
+            if found != src {
+                e.place = e.place.replace(&found.display().to_string(), &src.display().to_string());
+            }
+            e
+        };
+        let (format, mut source) = read_it().map_err(name_zip)?;
         if !source.shots.iter().any(|s| s.split == Split::Train) {
             let hint = "check that the folder is complete, or name another --format";
             return Err(CaptureError::new(
@@ -131,12 +189,14 @@ pub fn import<P: AsRef<Path>>(
                 hint,
             ));
         }
+        thin::thin(&mut source, config);
         formats.push(format);
         parts.push((src.to_path_buf(), source));
     }
-    let source = join::join(parts)?;
+    let mut source = join::join(parts)?;
     let name = recording_name(sources, out);
-    let recording = store::store(&source, &name, out, progress)?;
+    let (recording, notes) = store::store(&source, &name, out, config.min_confidence, progress)?;
+    source.notes.extend(notes);
     Ok(ImportReport {
         recording: recording.root.clone(),
         formats,
@@ -144,6 +204,23 @@ pub fn import<P: AsRef<Path>>(
         frames: recording.frames.len(),
         notes: source.notes,
     })
+}
+
+/// The folder (or file) to read: zip files are unpacked, and what holds nothing but one folder is that
+/// folder.
+fn find(src: &Path, scratch: &mut Scratch) -> Result<PathBuf, CaptureError> {
+    let mut found = src.to_path_buf();
+    if src.is_file() && unpack::is_zip(src) {
+        found = scratch.folder()?;
+        unpack::unpack(src, &found)?;
+    }
+    while found.is_dir() && format::known(&found).is_none() {
+        match &subfolders(&found)[..] {
+            [only] => found = only.clone(),
+            _ => return Ok(if found.starts_with(src) { src.to_path_buf() } else { found }),
+        }
+    }
+    Ok(found)
 }
 
 /// The pictures of one source. `several`: it is one of several, and one state.
@@ -155,6 +232,7 @@ fn read(src: &Path, format: Format, several: bool) -> Result<Source, CaptureErro
         Format::Paris => paris::read(src)?.into(),
         Format::Screwsplat => screwsplat::read(src)?.into(),
         Format::Dynamic3dgs => dynamic3dgs::read(src)?.into(),
+        Format::Record3d => record3d::read(src)?,
     })
 }
 

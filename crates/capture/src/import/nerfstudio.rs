@@ -2,7 +2,7 @@
 //! frames with our `state` or a `time` of a few values. `applied_transform` is in the poses
 //! already.
 
-use super::{Lens, MaskFrom, Shot, Source, numbers, subfolders};
+use super::{Grid, Lens, MaskFrom, Shot, Source, numbers, subfolders};
 use crate::CaptureError;
 use crate::recording::camera_from_gl;
 use crate::recording::transforms::{self, DefaultState, Document};
@@ -47,9 +47,10 @@ pub(super) fn read(src: &Path, one_state: bool) -> Result<Source, CaptureError> 
                 camera: Camera { width, height, fx, fy, cx, cy, camera_from_world },
                 lens: Lens { k: [k1, k2, k3, k4], p: [p1, p2], fisheye: i.fisheye },
                 color: numbers::with_image_ending(e.color.clone()),
-                depth: e.depth.clone(),
+                depth: e.depth.clone().map(Grid::File),
                 depth_scale: e.depth_scale,
                 depth_least: 0.0,
+                confidence: None,
                 mask: e.mask.clone().map_or(MaskFrom::Alpha, MaskFrom::File),
                 occluder: e.occluder_mask.clone(),
                 occluded: e.occluded,

@@ -85,3 +85,47 @@ pub fn npy(path: PathBuf, shape: &[u64], values: &[f64]) {
 pub fn write_json(path: PathBuf, value: Value) {
     save(path, |p| std::fs::write(p, value.to_string()).unwrap());
 }
+
+/// A camera picture of which depth sees every `SHRINK`-th pixel.
+pub const SHRINK: u32 = 4;
+
+/// A red square where the depth of a smaller map (see [`depth`] with `SHRINK`) has its dot.
+pub fn large_rgb(path: PathBuf, uv: DVec2) {
+    let on = dot(uv / f64::from(SHRINK));
+    let pixel =
+        |x: u32, y: u32| if on(x / SHRINK, y / SHRINK) { image::Rgb([255u8, 0, 0]) } else { image::Rgb([0, 0, 0]) };
+    save(path, |p| image::RgbImage::from_fn(W as u32, H as u32, pixel).save(p).unwrap());
+}
+
+/// A confidence map of depth's size: 0 in the left half, `high` in the right.
+pub fn confidence(path: PathBuf, high: u8) {
+    let (w, h) = (W as u32 / SHRINK, H as u32 / SHRINK);
+    save(path, |p| {
+        image::GrayImage::from_fn(w, h, |x, _| image::Luma([if x < w / 2 { 0 } else { high }])).save(p).unwrap()
+    });
+}
+
+/// qx qy qz qw tx ty tz of a camera-to-world matrix.
+pub fn quaternion(rows: &[[f64; 4]; 4]) -> [f64; 7] {
+    let m = DMat4::from_cols_array_2d(rows).transpose();
+    let q = glam::DQuat::from_mat4(&m);
+    [q.x, q.y, q.z, q.w, m.w_axis.x, m.w_axis.y, m.w_axis.z]
+}
+
+/// A small depth map as plain numbers: metres at the dot, 0 elsewhere.
+pub fn metres(uv: DVec2, z: f64) -> Vec<f32> {
+    let on = dot(uv / f64::from(SHRINK));
+    let (w, h) = (W as u32 / SHRINK, H as u32 / SHRINK);
+    (0..w * h).map(|i| if on(i % w, i / w) { z as f32 } else { 0.0 }).collect()
+}
+
+/// Looks for the point of a frame's state in its picture and its depth (tolerance 2 mm).
+pub fn shows(recording: &hingecast_capture::Recording, frame: usize, point: DVec3) {
+    let camera = recording.frames[frame].camera;
+    let (uv, z) = camera.project(point);
+    let view = recording.load(frame).unwrap();
+    let p = uv.y.floor() as usize * camera.width + uv.x.floor() as usize;
+    let [r, g, b] = [0, 1, 2].map(|c| view.rgb[3 * p + c]);
+    assert!(r > 150 && g < 100 && b < 100, "frame {frame}: {r} {g} {b} at {uv}");
+    assert!((f64::from(view.depth[p]) - z).abs() < 2e-3, "frame {frame}: {} {z} at {uv}", view.depth[p]);
+}

@@ -6,7 +6,12 @@ use hingecast::failure::Result;
 use hingecast_capture::import::{Config, Format, import};
 
 pub fn run(session: &Session, args: &Import) -> Result<Outcome> {
-    let config = Config { format: Format::from_name(&args.format)? };
+    let config = Config {
+        format: Format::from_name(&args.format)?,
+        min_confidence: args.min_confidence,
+        every: args.every,
+        max_views: args.max_views,
+    };
     let report = import(&args.sources, &args.out, &config, &session.ui.stage("import"))?;
     report.notes.iter().for_each(|note| session.ui.say(&format!("note: {note}")));
     session.ui.say(&format!(
