@@ -207,3 +207,107 @@ fn a_film_is_thinned_evenly_and_says_so() {
         assert!(report.notes.iter().any(|n| n.contains("of 5 pictures were left out")), "{:?}", report.notes);
     }
 }
+
+#[test]
+fn scanner_3d_app_without_where_it_was() {
+    let (_dir, src) = folder();
+    for (i, c) in cameras().iter().enumerate() {
+        let n = 3 * i;
+        let (uv, z) = c.project(POINTS[0]);
+        large_rgb(src.join(format!("frame_{n:05}.jpg")), uv);
+        depth(src.join(format!("depth_{n:05}.png")), uv, z, SHRINK);
+        confidence(src.join(format!("conf_{n:05}.png")), 2);
+        let about = json!({ "intrinsics": k(c).concat(), "cameraPoseARFrame": gl(c).concat(), "time": 0.1 * n as f64,
+            "location": { "latitude": 48.858_222, "longitude": 2.2945 } });
+        write_json(src.join(format!("frame_{n:05}.json")), about.clone());
+        // Depth without a picture.
+        write_json(src.join(format!("frame_{:05}.json", n + 1)), about);
+        depth(src.join(format!("depth_{:05}.png", n + 1)), uv, z, SHRINK);
+    }
+    write_json(src.join("info.json"), json!({ "gps": [48.858_222, 2.2945] }));
+    let (recording, report) = verify(&src, Format::Scanner3d);
+    assert!(report.notes.iter().any(|n| n.contains("5 of 10 frames")), "{:?}", report.notes);
+    let text = std::fs::read_to_string(recording.root.join("transforms.json")).unwrap();
+    assert!(!text.contains("48.85") && !text.contains("location"));
+    let (recording, _) = imported(&src, &Config::default()).unwrap();
+    assert_eq!(known_halves(&recording, 0), [0, SMALL.0 * SMALL.1 / 2]);
+}
+
+/// The folder of a scan; `film` is what the pictures' place is called, numbered from `first`.
+fn stray(src: &Path, pictures: &str, first: usize) {
+    let mut csv = String::from(
+        "timestamp, frame, x, y, z, qx, qy, qz, qw, fx, fy, cx, cy, distortion_center_x, distortion_center_y\n",
+    );
+    for (i, c) in cameras().iter().enumerate() {
+        let (uv, z) = c.project(POINTS[0]);
+        large_rgb(src.join(format!("{pictures}/{:06}.jpg", first + i)), uv);
+        depth(src.join(format!("depth/{i:06}.png")), uv, z, SHRINK);
+        confidence(src.join(format!("confidence/{i:06}.png")), 2);
+        let world_from_camera = c.camera_from_world.inverse();
+        let (q, t) = (world_from_camera.rot, world_from_camera.trans);
+        csv += &format!(
+            "{}, {i:06}, {}, {}, {}, {}, {}, {}, {}, {}, {}, {}, {}, , \n",
+            170_340.47 + i as f64 / 60.0,
+            t.x,
+            t.y,
+            t.z,
+            q.x,
+            q.y,
+            q.z,
+            q.w,
+            c.fx,
+            c.fy,
+            c.cx,
+            c.cy
+        );
+    }
+    std::fs::write(src.join("odometry.csv"), csv).unwrap();
+    std::fs::write(src.join("camera_matrix.csv"), "1.0, 0.0, 2.0\n0.0, 1.0, 3.0\n0.0, 0.0, 1.0\n").unwrap();
+}
+
+#[test]
+fn stray_scanner() {
+    for (pictures, first) in [("rgb", 0), ("images", 1)] {
+        let (_dir, src) = folder();
+        stray(&src, pictures, first);
+        let (recording, _) = verify(&src, Format::Stray);
+        assert!((recording.frames[1].time.unwrap() - 170_340.486_666).abs() < 1e-3);
+    }
+    // From 1 and not one for each row: whose picture is which?
+    let (_dir, src) = folder();
+    stray(&src, "rgb", 1);
+    std::fs::remove_file(src.join("rgb/000005.jpg")).unwrap();
+    let e = imported(&src, &Config::default()).unwrap_err();
+    assert!(e.what.contains("unclear") && e.hint.contains("-start_number 0"), "{e}");
+    std::fs::remove_dir_all(src.join("rgb")).unwrap();
+    let e = imported(&src, &Config::default()).unwrap_err();
+    assert!(e.what.contains("no film"), "{e}");
+    // A film that is none: with ffmpeg or without it, three lines say what to run.
+    std::fs::write(src.join("rgb.mp4"), "no film").unwrap();
+    let e = imported(&src, &Config::default()).unwrap_err();
+    assert!(e.place.ends_with("rgb.mp4") && e.hint.contains("ffmpeg -noautorotate -i"), "{e}");
+}
+
+#[test]
+fn polycam_raw_data() {
+    let (_dir, src) = folder();
+    for (i, c) in cameras().iter().enumerate() {
+        let (uv, z) = c.project(POINTS[0]);
+        let file = |folder: &str, ending: &str| src.join(format!("keyframes/{folder}/{}.{ending}", 7_000_000 + i));
+        large_rgb(file("corrected_images", "jpg"), uv);
+        depth(file("depth", "png"), uv, z, SHRINK);
+        confidence(file("confidence", "png"), [127, 255][i % 2]);
+        let mut about =
+            json!({ "fx": c.fx, "fy": c.fy, "cx": c.cx, "cy": c.cy, "width": W, "height": H, "blur_score": 99.0 });
+        for (r, row) in gl(c)[..3].iter().enumerate() {
+            row.iter().enumerate().for_each(|(k, x)| about[format!("t_{r}{k}")] = json!(x));
+        }
+        write_json(file("corrected_cameras", "json"), about);
+    }
+    verify(&src, Format::Polycam);
+    let half = SMALL.0 * SMALL.1 / 2;
+    for (min_confidence, expected) in [(1, [half, half]), (2, [0, half])] {
+        let (recording, _) = imported(&src, &Config { min_confidence, ..Default::default() }).unwrap();
+        assert_eq!([0, 1].map(|i| known_halves(&recording, i)[1]), expected);
+    }
+}

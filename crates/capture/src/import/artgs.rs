@@ -51,6 +51,7 @@ fn read_file(src: &Path, file: &Path, state: usize, split: Split, shots: &mut Ve
             depth_scale: 1e-3,
             depth_least: LEAST_DEPTH,
             confidence: None,
+            film_frame: None,
             mask: beside(&color, "mask").map_or(MaskFrom::Alpha, MaskFrom::File),
             occluder: None,
             occluded: false,

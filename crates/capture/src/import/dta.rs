@@ -35,6 +35,7 @@ pub(super) fn read(src: &Path) -> Result<Vec<Shot>, CaptureError> {
             depth_scale: 1e-3,
             depth_least: 0.0,
             confidence: None,
+            film_frame: None,
             mask: mask.map_or(MaskFrom::Alpha, MaskFrom::File),
             occluder: None,
             occluded: false,

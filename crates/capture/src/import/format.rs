@@ -1,9 +1,10 @@
 //! The layouts that can be imported: their names, and how each is told from the others.
 
+use super::numbers::numbered;
 use super::subfolders;
 use crate::CaptureError;
 use serde::{Deserialize, Serialize};
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 /// A layout that can be imported.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
@@ -26,11 +27,17 @@ pub enum Format {
     Dynamic3dgs,
     /// Record3D's "EXR + RGBD" or .r3d: `metadata.json`, `rgb/`, `depth/`; or `metadata`, `rgbd/`.
     Record3d,
+    /// 3D Scanner App's "All Data": `frame_00000.json`, `depth_00000.png`.
+    Scanner3d,
+    /// Stray Scanner: `odometry.csv`, `rgb.mp4`, `depth/`.
+    Stray,
+    /// Polycam's raw data: `keyframes/`.
+    Polycam,
 }
 
 impl Format {
     /// Every format with its name on the command line.
-    pub const ALL: [(&'static str, Format); 8] = [
+    pub const ALL: [(&'static str, Format); 11] = [
         ("auto", Format::Auto),
         ("nerfstudio", Format::Nerfstudio),
         ("artgs", Format::Artgs),
@@ -39,6 +46,9 @@ impl Format {
         ("screwsplat", Format::Screwsplat),
         ("dynamic3dgs", Format::Dynamic3dgs),
         ("record3d", Format::Record3d),
+        ("scanner3d", Format::Scanner3d),
+        ("stray", Format::Stray),
+        ("polycam", Format::Polycam),
     ];
 
     /// Its name on the command line.
@@ -102,9 +112,23 @@ pub(super) fn known(src: &Path) -> Option<Format> {
         Some(Format::Screwsplat)
     } else if has("metadata.json") && has("rgb") || has("metadata") && has("rgbd") {
         Some(Format::Record3d)
+    } else if has("frame_00000.json") || !numbered_frames(src).is_empty() {
+        Some(Format::Scanner3d)
+    } else if has("odometry.csv") {
+        Some(Format::Stray)
+    } else if has("keyframes/corrected_cameras") || has("keyframes/cameras") || has("corrected_cameras") {
+        Some(Format::Polycam)
     } else if has("transforms.json") || any_sub("transforms.json") || src.is_file() {
         Some(Format::Nerfstudio)
     } else {
         None
     }
+}
+
+/// 3D Scanner App's descriptions of frames; the first ones may have been taken away.
+fn numbered_frames(src: &Path) -> Vec<(usize, PathBuf)> {
+    let mut frames = numbered(src, &["json"]);
+    let ours = |p: &Path| p.file_name().and_then(|n| n.to_str()).is_some_and(|n| n.starts_with("frame_"));
+    frames.retain(|(_, p)| ours(p) && p.with_extension("jpg").is_file());
+    frames
 }

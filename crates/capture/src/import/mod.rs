@@ -7,6 +7,7 @@
 mod artgs;
 mod dta;
 mod dynamic3dgs;
+mod film;
 mod format;
 mod grid;
 mod join;
@@ -14,10 +15,13 @@ mod lens;
 mod nerfstudio;
 mod numbers;
 mod paris;
+mod polycam;
 mod record3d;
 mod resize;
+mod scanner3d;
 mod screwsplat;
 mod store;
+mod stray;
 mod thin;
 mod unpack;
 
@@ -78,6 +82,8 @@ pub(crate) struct Shot {
     pub camera: Camera,
     pub lens: Lens,
     pub color: PathBuf,
+    /// `color` is a film, and this the number of its picture, from 0.
+    pub film_frame: Option<usize>,
     /// May be smaller than the colour image.
     pub depth: Option<Grid>,
     /// Scene units per stored unit; depths below `depth_least` (scene units) are invalid.
@@ -102,6 +108,7 @@ impl Shot {
             camera,
             lens: Lens::default(),
             color,
+            film_frame: None,
             depth: None,
             depth_scale: 1e-3,
             depth_least: 0.0,
@@ -190,6 +197,7 @@ pub fn import<P: AsRef<Path>>(
             ));
         }
         thin::thin(&mut source, config);
+        film::take_out(&mut source.shots, &mut scratch)?;
         formats.push(format);
         parts.push((src.to_path_buf(), source));
     }
@@ -233,6 +241,9 @@ fn read(src: &Path, format: Format, several: bool) -> Result<Source, CaptureErro
         Format::Screwsplat => screwsplat::read(src)?.into(),
         Format::Dynamic3dgs => dynamic3dgs::read(src)?.into(),
         Format::Record3d => record3d::read(src)?,
+        Format::Scanner3d => scanner3d::read(src)?,
+        Format::Stray => stray::read(src)?,
+        Format::Polycam => polycam::read(src)?,
     })
 }
 

@@ -51,6 +51,7 @@ pub(super) fn read(src: &Path, one_state: bool) -> Result<Source, CaptureError> 
                 depth_scale: e.depth_scale,
                 depth_least: 0.0,
                 confidence: None,
+                film_frame: None,
                 mask: e.mask.clone().map_or(MaskFrom::Alpha, MaskFrom::File),
                 occluder: e.occluder_mask.clone(),
                 occluded: e.occluded,

@@ -37,6 +37,7 @@ pub(super) fn read(src: &Path) -> Result<Vec<Shot>, CaptureError> {
                 depth_scale: if in_units { 1.0 } else { 1e-3 },
                 depth_least: 0.0,
                 confidence: None,
+                film_frame: None,
                 mask: MaskFrom::Alpha,
                 occluder: None,
                 occluded: false,
