@@ -194,7 +194,8 @@ fn read_check(at: &Path) -> Result<(), String> {
 fn read_import(at: &Path) -> Result<(), String> {
     let out = at.with_extension("imported");
     let _ = std::fs::remove_dir_all(&out);
-    let answer = import::import(at, &out, import::Format::Nerfstudio, &Progress::default());
+    let config = import::Config { format: import::Format::Nerfstudio, ..Default::default() };
+    let answer = import::import(&[at], &out, &config, &Progress::default());
     let _ = std::fs::remove_dir_all(&out);
     answer.map(|_| ()).map_err(text)
 }

@@ -3,7 +3,7 @@
 mod common;
 
 use common::{hinged_box, small};
-use hingecast_capture::import::{Format, import};
+use hingecast_capture::import::{Config, import};
 use hingecast_capture::synth::{SynthConfig, synth};
 use hingecast_capture::{CaptureError, Recording};
 use hingecast_geom::Progress;
@@ -19,7 +19,7 @@ fn imported(dir: &Path, config: &SynthConfig, change: impl Fn(&mut Value)) -> Re
     change(&mut value);
     std::fs::write(&file, value.to_string()).unwrap();
     let out = dir.join("out");
-    import(&rec, &out, Format::Auto, &Progress::default())?;
+    import(&[&rec], &out, &Config::default(), &Progress::default())?;
     Recording::open(&out)
 }
 

@@ -2,92 +2,15 @@
 //! its pixel, with its depth and mask. Conversions here are written out anew, not taken from the
 //! crate.
 
-use glam::{DMat4, DVec2, DVec3, DVec4};
-use hingecast_capture::import::{Format, detect, import};
+mod common;
+
+use common::dots::*;
+use glam::DVec2;
+use hingecast_capture::import::{Config, Format, detect, import};
 use hingecast_capture::{Recording, Split};
 use hingecast_geom::Camera;
-use npyz::WriterBuilder;
-use serde_json::{Value, json};
+use serde_json::json;
 use std::path::{Path, PathBuf};
-
-const W: usize = 64;
-const H: usize = 48;
-/// One point a state: a wrong state would show.
-const POINTS: [DVec3; 2] = [DVec3::new(0.31, -0.17, 0.15), DVec3::new(-0.25, 0.2, 0.28)];
-
-fn cameras() -> Vec<Camera> {
-    (0..5)
-        .map(|i| {
-            let a = 1.1 * i as f64;
-            let eye = DVec3::new(1.5 * a.cos(), 1.5 * a.sin(), 0.6 + 0.1 * i as f64);
-            Camera::look_at(eye, DVec3::ZERO, DVec3::Z, W, H, 0.7)
-        })
-        .collect()
-}
-
-/// world_from_camera with OpenGL axes, rows.
-fn gl(c: &Camera) -> [[f64; 4]; 4] {
-    let m = c.camera_from_world.inverse().to_mat4() * DMat4::from_diagonal(DVec4::new(1.0, -1.0, -1.0, 1.0));
-    m.transpose().to_cols_array_2d()
-}
-
-/// camera_from_world with OpenCV axes, rows.
-fn cv(c: &Camera) -> [[f64; 4]; 4] {
-    c.camera_from_world.to_mat4().transpose().to_cols_array_2d()
-}
-
-fn k(c: &Camera) -> [[f64; 3]; 3] {
-    [[c.fx, 0.0, c.cx], [0.0, c.fy, c.cy], [0.0, 0.0, 1.0]]
-}
-
-fn dot(uv: DVec2) -> impl Fn(u32, u32) -> bool {
-    move |x, y| (f64::from(x) - uv.x.floor()).abs() <= 1.0 && (f64::from(y) - uv.y.floor()).abs() <= 1.0
-}
-
-fn save<I: Fn(&Path)>(path: PathBuf, write: I) {
-    std::fs::create_dir_all(path.parent().unwrap()).unwrap();
-    write(&path);
-}
-
-/// A red dot at `uv` on black; alpha only at the dot.
-fn rgba(path: PathBuf, uv: DVec2) {
-    let on = dot(uv);
-    let pixel = |x, y| if on(x, y) { image::Rgba([255, 0, 0, 255]) } else { image::Rgba([0, 0, 0, 0]) };
-    save(path, |p| image::RgbaImage::from_fn(W as u32, H as u32, pixel).save(p).unwrap());
-}
-
-fn rgb(path: PathBuf, uv: DVec2) {
-    let on = dot(uv);
-    let pixel = |x, y| if on(x, y) { image::Rgb([255, 0, 0]) } else { image::Rgb([0, 0, 0]) };
-    save(path, |p| image::RgbImage::from_fn(W as u32, H as u32, pixel).save(p).unwrap());
-}
-
-fn mask(path: PathBuf, uv: DVec2, one: u8) {
-    let on = dot(uv);
-    let pixel = |x, y| image::Luma([if on(x, y) { one } else { 0 }]);
-    save(path, |p| image::GrayImage::from_fn(W as u32, H as u32, pixel).save(p).unwrap());
-}
-
-/// Millimetres at the dot, 50 mm (invalid in some layouts) elsewhere; `shrink` halves the size.
-fn depth(path: PathBuf, uv: DVec2, z: f64, shrink: u32) {
-    let on = dot(uv / f64::from(shrink));
-    let pixel = |x, y| image::Luma([if on(x, y) { (z * 1000.0).round() as u16 } else { 50u16 }]);
-    let (w, h) = (W as u32 / shrink, H as u32 / shrink);
-    save(path, |p| image::ImageBuffer::<image::Luma<u16>, _>::from_fn(w, h, pixel).save(p).unwrap());
-}
-
-fn npy(path: PathBuf, shape: &[u64], values: &[f64]) {
-    save(path, |p| {
-        let file = std::fs::File::create(p).unwrap();
-        let mut w = npyz::WriteOptions::new().default_dtype().shape(shape).writer(file).begin_nd().unwrap();
-        w.extend(values.iter().copied()).unwrap();
-        w.finish().unwrap();
-    });
-}
-
-fn write_json(path: PathBuf, value: Value) {
-    save(path, |p| std::fs::write(p, value.to_string()).unwrap());
-}
 
 struct Expect {
     format: Format,
@@ -100,12 +23,13 @@ struct Expect {
 fn verify(src: &Path, e: &Expect) -> Recording {
     assert_eq!(detect(src).unwrap(), e.format);
     let out = src.with_extension("imported");
-    let report = import(src, &out, Format::Auto, &Default::default()).unwrap();
-    assert_eq!((report.format, report.states), (e.format, e.states));
+    let report = import(&[src], &out, &Config::default(), &Default::default()).unwrap();
+    assert_eq!((report.formats, report.states), (vec![e.format], e.states));
     let recording = Recording::open(&out).unwrap();
     for (i, f) in recording.frames.iter().enumerate() {
         let (uv, z) = f.camera.project(POINTS[f.state]);
-        let p = uv.y.floor() as usize * W + uv.x.floor() as usize;
+        let (w, h) = (f.camera.width, f.camera.height);
+        let p = uv.y.floor() as usize * w + uv.x.floor() as usize;
         let view = recording.load(i).unwrap();
         let [r, g, b] = [0, 1, 2].map(|c| view.rgb[3 * p + c]);
         assert!(r > 150 && g < 100 && b < 100, "state {} view {}: {r} {g} {b} at {uv}", f.state, f.view);
@@ -113,7 +37,7 @@ fn verify(src: &Path, e: &Expect) -> Recording {
             assert!((f64::from(view.depth[p]) - z).abs() < 2e-3, "{} {z}", view.depth[p]);
         }
         if e.mask {
-            let far = ((H as f64 - 1.0 - uv.y.floor()) as usize) * W + (W as f64 - 1.0 - uv.x.floor()) as usize;
+            let far = ((h as f64 - 1.0 - uv.y.floor()) as usize) * w + (w as f64 - 1.0 - uv.x.floor()) as usize;
             assert_eq!((view.mask[p], view.mask[far]), (1, 0));
         }
     }
@@ -298,7 +222,9 @@ fn nerfstudio_with_a_folder_per_state() {
 fn broken_sources_end_in_three_lines() {
     let (_dir, src) = folder();
     let fails = |what: &str| {
-        let e = import(&src, &src.with_extension("out"), Format::Auto, &Default::default()).unwrap_err().to_string();
+        let e = import(&[&src], &src.with_extension("out"), &Config::default(), &Default::default())
+            .unwrap_err()
+            .to_string();
         assert!(e.lines().count() == 3 && e.contains(what), "{e}");
     };
     fails("not recognised");

@@ -7,6 +7,7 @@ use clap::builder::{PossibleValuesParser, TypedValueParser};
 use clap::{Args, Parser, Subcommand};
 use hingecast::config::{Method, Preset};
 use hingecast::import_object::ImportConfig;
+use hingecast_capture::import;
 use hingecast_capture::synth::Noise;
 use std::path::PathBuf;
 pub use studies::{Bench, Demos, Experiment, Rollout, Train};
@@ -160,14 +161,25 @@ pub struct SynthSettings {
 
 #[derive(Args, Debug)]
 pub struct Import {
-    /// Folder of the recording to convert.
-    pub source: PathBuf,
+    /// Folder of the recording to convert. Several: one state each, in this order.
+    #[arg(required = true, value_name = "SOURCE")]
+    pub sources: Vec<PathBuf>,
     /// Recording folder to write.
     #[arg(long, short)]
     pub out: PathBuf,
-    /// Layout of the source: auto, nerfstudio, artgs, dta, paris, screwsplat or dynamic3dgs.
+    /// Layout of the sources: auto, nerfstudio, artgs, dta, paris, screwsplat or dynamic3dgs.
     #[arg(long, default_value = "auto")]
     pub format: String,
+    /// Pixels of less confidence lose their depth, where the source has confidence maps: 0 low, 1
+    /// medium, 2 high.
+    #[arg(long, default_value_t = import::Config::default().min_confidence, value_name = "LEVEL", value_parser = clap::value_parser!(u8).range(0..=2))]
+    pub min_confidence: u8,
+    /// Of a film, only every so many-th picture.
+    #[arg(long, default_value_t = import::Config::default().every, value_name = "N", value_parser = at_least_one)]
+    pub every: usize,
+    /// At most so many training pictures a state, evenly spread over what is there.
+    #[arg(long, default_value_t = import::Config::default().max_views, value_name = "N", value_parser = at_least_one)]
+    pub max_views: usize,
 }
 
 #[derive(Args, Debug)]

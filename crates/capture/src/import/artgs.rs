@@ -3,7 +3,7 @@
 //! `depth/` beside them in millimetres.
 
 use super::numbers::{image_size, json, matrix, pose_from_gl, with_image_ending, wrong};
-use super::{Lens, MaskFrom, Shot};
+use super::{Grid, Lens, MaskFrom, Shot};
 use crate::{CaptureError, Split};
 use hingecast_geom::Camera;
 use std::path::{Path, PathBuf};
@@ -47,9 +47,11 @@ fn read_file(src: &Path, file: &Path, state: usize, split: Split, shots: &mut Ve
             split,
             camera: Camera { width, height, fx, fy, cx, cy, camera_from_world },
             lens: Lens::default(),
-            depth: beside(&color, "depth"),
+            depth: beside(&color, "depth").map(Grid::File),
             depth_scale: 1e-3,
             depth_least: LEAST_DEPTH,
+            confidence: None,
+            film_frame: None,
             mask: beside(&color, "mask").map_or(MaskFrom::Alpha, MaskFrom::File),
             occluder: None,
             occluded: false,

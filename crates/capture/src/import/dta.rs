@@ -2,7 +2,7 @@
 //! 1 per frame id, `color_segmented/`, `depth_filtered/` (millimetres, maybe smaller), `mask/`.
 
 use super::numbers::{camera, image_size, pose_from_gl, rows, with_image_ending, wrong};
-use super::{Lens, MaskFrom, Shot};
+use super::{Grid, Lens, MaskFrom, Shot};
 use crate::{CaptureError, Split};
 use std::path::Path;
 
@@ -31,9 +31,11 @@ pub(super) fn read(src: &Path) -> Result<Vec<Shot>, CaptureError> {
             camera: camera(&k, image_size(&color)?, camera_from_world),
             lens: Lens::default(),
             color,
-            depth,
+            depth: depth.map(Grid::File),
             depth_scale: 1e-3,
             depth_least: 0.0,
+            confidence: None,
+            film_frame: None,
             mask: mask.map_or(MaskFrom::Alpha, MaskFrom::File),
             occluder: None,
             occluded: false,

@@ -1,73 +1,60 @@
 //! Other layouts of the field into native recordings.
 //!
-//! Each layout's file lists its pictures as `Shot`s; `store` decodes, undistorts, brings depth and
-//! mask to the colour's size and writes them. World frame and scale stay the source's.
+//! Each layout's file lists its pictures as `Shot`s; `store` decodes, brings colour and mask to the
+//! size of the depth, undistorts and writes them. World frame and scale stay the source's; `join` puts
+//! several sources together, a state each.
 
 mod artgs;
 mod dta;
 mod dynamic3dgs;
+mod film;
+mod format;
+mod grid;
+mod join;
 mod lens;
 mod nerfstudio;
 mod numbers;
 mod paris;
+mod polycam;
+mod record3d;
+mod resize;
+mod scanner3d;
 mod screwsplat;
 mod store;
+mod stray;
+mod thin;
+mod unpack;
+
+pub use format::{Format, detect};
 
 use crate::{CaptureError, Split};
 use glam::DVec3;
+use grid::Grid;
 use hingecast_geom::{Camera, Progress};
 use lens::Lens;
-use serde::{Deserialize, Serialize};
+use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
+use unpack::Scratch;
 
-/// A layout that can be imported.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "lowercase")]
-pub enum Format {
-    /// Find out from the files.
-    #[default]
-    Auto,
-    /// `transforms.json`, also of Polycam, Record3D and KIRI; folders with one each are states.
-    Nerfstudio,
-    /// ArtGS, GEAR, REArtGS++, MPArt-90: `transforms_train_start.json` and so on.
-    Artgs,
-    /// `cam_K.txt`, `init_keyframes.yml`.
-    Dta,
-    /// `start/camera_train.json` and so on.
-    Paris,
-    /// `<state>/{images,extrinsics,intrinsic.npy}`.
-    Screwsplat,
-    /// `train_meta.json`, `ims/`, `seg/`.
-    Dynamic3dgs,
+/// What to import, and how much of it.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Config {
+    /// Layout of all sources; [`Format::Auto`] looks at each.
+    pub format: Format,
+    /// Pixels of less confidence lose their depth, where the source has confidence maps: 0 low, 1
+    /// medium, 2 high (ARKit's scale).
+    pub min_confidence: u8,
+    /// Of each state, only every so many-th training picture; at least 1.
+    pub every: usize,
+    /// At most so many training pictures a state, evenly spread.
+    pub max_views: usize,
 }
 
-impl Format {
-    /// Every format with its name on the command line.
-    pub const ALL: [(&'static str, Format); 7] = [
-        ("auto", Format::Auto),
-        ("nerfstudio", Format::Nerfstudio),
-        ("artgs", Format::Artgs),
-        ("dta", Format::Dta),
-        ("paris", Format::Paris),
-        ("screwsplat", Format::Screwsplat),
-        ("dynamic3dgs", Format::Dynamic3dgs),
-    ];
-
-    /// Its name on the command line.
-    pub fn name(self) -> &'static str {
-        Self::ALL.iter().find(|(_, f)| *f == self).map_or("auto", |(name, _)| name)
-    }
-
-    /// The format of a name on the command line.
-    ///
-    /// # Errors
-    /// When there is no such format.
-    pub fn from_name(name: &str) -> Result<Self, CaptureError> {
-        let known = Self::ALL.iter().find(|(n, _)| *n == name).map(|(_, f)| *f);
-        known.ok_or_else(|| {
-            let names = Self::ALL.map(|(n, _)| n).join(", ");
-            CaptureError::new("there is no such format", format!("--format {name}"), format!("use one of {names}"))
-        })
+impl Default for Config {
+    /// ARKit's low confidence is depth it made up at edges. 120 views show a thing from all sides; a
+    /// film has thousands, which cost time and add no side.
+    fn default() -> Self {
+        Self { format: Format::Auto, min_confidence: 1, every: 1, max_views: 120 }
     }
 }
 
@@ -76,12 +63,14 @@ impl Format {
 pub struct ImportReport {
     /// Folder of the native recording.
     pub recording: PathBuf,
-    /// The layout that was read; never [`Format::Auto`].
-    pub format: Format,
+    /// The layout of each source; never [`Format::Auto`].
+    pub formats: Vec<Format>,
     /// How many joint states it has.
     pub states: usize,
     /// How many frames it has, over all states.
     pub frames: usize,
+    /// What a person should know: what was left out, resized or assumed. One sentence each.
+    pub notes: Vec<String>,
 }
 
 /// One picture of a source, geometry converted to our conventions, pixels not read yet.
@@ -93,16 +82,43 @@ pub(crate) struct Shot {
     pub camera: Camera,
     pub lens: Lens,
     pub color: PathBuf,
-    pub depth: Option<PathBuf>,
+    /// `color` is a film, and this the number of its picture, from 0.
+    pub film_frame: Option<usize>,
+    /// May be smaller than the colour image.
+    pub depth: Option<Grid>,
     /// Scene units per stored unit; depths below `depth_least` (scene units) are invalid.
     pub depth_scale: f64,
     pub depth_least: f64,
+    /// Of the depth, pixel by pixel.
+    pub confidence: Option<Grid>,
     pub mask: MaskFrom,
     /// Pixels that a hand hides.
     pub occluder: Option<PathBuf>,
     /// The person hides the object.
     pub occluded: bool,
     pub time: Option<f64>,
+}
+
+impl Shot {
+    /// A training picture of the only state, without depth, its mask in its alpha.
+    pub fn of(camera: Camera, color: PathBuf) -> Self {
+        Self {
+            state: 0,
+            split: Split::Train,
+            camera,
+            lens: Lens::default(),
+            color,
+            film_frame: None,
+            depth: None,
+            depth_scale: 1e-3,
+            depth_least: 0.0,
+            confidence: None,
+            mask: MaskFrom::Alpha,
+            occluder: None,
+            occluded: false,
+            time: None,
+        }
+    }
 }
 
 /// All pictures of a source, and what it says about its world.
@@ -112,12 +128,23 @@ pub(crate) struct Source {
     pub metric: bool,
     /// Unit vector.
     pub up: DVec3,
+    /// All states share one world.
+    pub registered: bool,
+    /// See [`ImportReport::notes`].
+    pub notes: Vec<String>,
+}
+
+impl Source {
+    /// How many joint states there are.
+    fn states(&self) -> usize {
+        self.shots.iter().map(|s| s.state).collect::<BTreeSet<_>>().len()
+    }
 }
 
 impl From<Vec<Shot>> for Source {
     /// Layouts that say nothing of scale and up.
     fn from(shots: Vec<Shot>) -> Self {
-        Self { shots, metric: false, up: DVec3::Z }
+        Self { shots, metric: false, up: DVec3::Z, registered: true, notes: Vec::new() }
     }
 }
 
@@ -129,65 +156,102 @@ pub(crate) enum MaskFrom {
     File(PathBuf),
 }
 
-/// Converts `src` into a native recording at `out`.
+/// Converts sources into a native recording at `out`. One source may have several states; several
+/// sources are one state each, in the order given.
 ///
 /// # Errors
-/// When the layout is not recognised, or a file of it is missing or broken.
-pub fn import(src: &Path, out: &Path, format: Format, progress: &Progress) -> Result<ImportReport, CaptureError> {
-    let format = if format == Format::Auto { detect(src)? } else { format };
-    let source: Source = match format {
-        Format::Auto | Format::Nerfstudio => nerfstudio::read(src)?,
+/// When a layout is not recognised, a file of it is missing or broken, one of several sources has
+/// several states, or `out` holds something that is no recording.
+pub fn import<P: AsRef<Path>>(
+    sources: &[P],
+    out: &Path,
+    config: &Config,
+    progress: &Progress,
+) -> Result<ImportReport, CaptureError> {
+    crate::synth::may_be_replaced(out)?;
+    let several = sources.len() > 1;
+    let mut scratch = Scratch::new(out);
+    let mut formats = Vec::new();
+    let mut parts = Vec::new();
+    for src in sources.iter().map(P::as_ref) {
+        progress.check()?;
+        let found = find(src, &mut scratch)?;
+        let read_it = || {
+            let format = if config.format == Format::Auto { detect(&found)? } else { config.format };
+            Ok((format, read(&found, format, several)?))
+        };
+        // Errors speak of the zip file, not of where it was unpacked.
+        let name_zip = |mut e: CaptureError| {
+            if found != src {
+                e.place = e.place.replace(&found.display().to_string(), &src.display().to_string());
+            }
+            e
+        };
+        let (format, mut source) = read_it().map_err(name_zip)?;
+        if !source.shots.iter().any(|s| s.split == Split::Train) {
+            let hint = "check that the folder is complete, or name another --format";
+            return Err(CaptureError::new(
+                format!("no training pictures were found for the layout {}", format.name()),
+                src.display().to_string(),
+                hint,
+            ));
+        }
+        thin::thin(&mut source, config);
+        film::take_out(&mut source.shots, &mut scratch)?;
+        formats.push(format);
+        parts.push((src.to_path_buf(), source));
+    }
+    let mut source = join::join(parts)?;
+    let name = recording_name(sources, out);
+    let (recording, notes) = store::store(&source, &name, out, config.min_confidence, progress)?;
+    source.notes.extend(notes);
+    Ok(ImportReport {
+        recording: recording.root.clone(),
+        formats,
+        states: recording.n_states,
+        frames: recording.frames.len(),
+        notes: source.notes,
+    })
+}
+
+/// The folder (or file) to read: zip files are unpacked, and what holds nothing but one folder is that
+/// folder.
+fn find(src: &Path, scratch: &mut Scratch) -> Result<PathBuf, CaptureError> {
+    let mut found = src.to_path_buf();
+    if src.is_file() && unpack::is_zip(src) {
+        found = scratch.folder()?;
+        unpack::unpack(src, &found)?;
+    }
+    while found.is_dir() && format::known(&found).is_none() {
+        match &subfolders(&found)[..] {
+            [only] => found = only.clone(),
+            _ => return Ok(if found.starts_with(src) { src.to_path_buf() } else { found }),
+        }
+    }
+    Ok(found)
+}
+
+/// The pictures of one source. `several`: it is one of several, and one state.
+fn read(src: &Path, format: Format, several: bool) -> Result<Source, CaptureError> {
+    Ok(match format {
+        Format::Auto | Format::Nerfstudio => nerfstudio::read(src, several)?,
         Format::Artgs => artgs::read(src)?.into(),
         Format::Dta => dta::read(src)?.into(),
         Format::Paris => paris::read(src)?.into(),
         Format::Screwsplat => screwsplat::read(src)?.into(),
         Format::Dynamic3dgs => dynamic3dgs::read(src)?.into(),
-    };
-    if !source.shots.iter().any(|s| s.split == Split::Train) {
-        let hint = "check that the folder is complete, or name another --format";
-        return Err(CaptureError::new(
-            format!("no training pictures were found for the layout {}", format.name()),
-            src.display().to_string(),
-            hint,
-        ));
-    }
-    let name = src.file_name().map(|n| n.to_string_lossy().into_owned()).unwrap_or_else(|| "recording".into());
-    let recording = store::store(&source, &name, out, progress)?;
-    Ok(ImportReport {
-        recording: recording.root.clone(),
-        format,
-        states: recording.n_states,
-        frames: recording.frames.len(),
+        Format::Record3d => record3d::read(src)?,
+        Format::Scanner3d => scanner3d::read(src)?,
+        Format::Stray => stray::read(src)?,
+        Format::Polycam => polycam::read(src)?,
     })
 }
 
-/// The layout of a folder, by the files that only it has.
-///
-/// # Errors
-/// When none fits.
-pub fn detect(src: &Path) -> Result<Format, CaptureError> {
-    let has = |name: &str| src.join(name).exists();
-    let subfolders = subfolders(src);
-    let any_sub = |name: &str| subfolders.iter().any(|p| p.join(name).exists());
-    if has("transforms_train_start.json") || has("transforms_train_end.json") {
-        Ok(Format::Artgs)
-    } else if has("cam_K.txt") || has("init_keyframes.yml") {
-        Ok(Format::Dta)
-    } else if has("start/camera_train.json") || has("end/camera_train.json") {
-        Ok(Format::Paris)
-    } else if has("train_meta.json") {
-        Ok(Format::Dynamic3dgs)
-    } else if any_sub("extrinsics") {
-        Ok(Format::Screwsplat)
-    } else if has("transforms.json") || any_sub("transforms.json") || src.is_file() {
-        Ok(Format::Nerfstudio)
-    } else {
-        Err(CaptureError::new(
-            "the layout is not recognised",
-            src.display().to_string(),
-            "known layouts: nerfstudio, ArtGS, DTA, PARIS, ScrewSplat, Dynamic 3D Gaussians; point at the folder that holds their json",
-        ))
-    }
+/// The name of the only source, or of the recording's folder.
+fn recording_name<P: AsRef<Path>>(sources: &[P], out: &Path) -> String {
+    let from = if let [only] = sources { only.as_ref() } else { out };
+    let name = if from.is_file() { from.file_stem() } else { from.file_name() };
+    name.map_or_else(|| "recording".into(), |n| n.to_string_lossy().into_owned())
 }
 
 /// Folders inside `src`; those named by numbers in numeric order, then the others by name.

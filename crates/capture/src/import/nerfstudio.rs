@@ -2,7 +2,7 @@
 //! frames with our `state` or a `time` of a few values. `applied_transform` is in the poses
 //! already.
 
-use super::{Lens, MaskFrom, Shot, Source, numbers, subfolders};
+use super::{Grid, Lens, MaskFrom, Shot, Source, numbers, subfolders};
 use crate::CaptureError;
 use crate::recording::camera_from_gl;
 use crate::recording::transforms::{self, DefaultState, Document};
@@ -16,7 +16,8 @@ const MOST_STATES: usize = 64;
 /// With fewer pictures a time than this, the times are those of a film, too.
 const LEAST_VIEWS: usize = 3;
 
-pub(super) fn read(src: &Path) -> Result<Source, CaptureError> {
+/// `one_state`: the source is one of several; a film is then one state.
+pub(super) fn read(src: &Path, one_state: bool) -> Result<Source, CaptureError> {
     let single = if src.is_file() { src.to_path_buf() } else { src.join("transforms.json") };
     let documents: Vec<Document> = if single.is_file() {
         vec![transforms::parse(src, &single, DefaultState::Is(0))?]
@@ -30,7 +31,11 @@ pub(super) fn read(src: &Path) -> Result<Source, CaptureError> {
             return Err(problem.error.clone());
         }
         let says_state = d.value["frames"].as_array().is_some_and(|f| f.iter().any(|f| f.get("state").is_some()));
-        let times = if says_state || documents.len() > 1 { BTreeMap::new() } else { states_by_time(d)? };
+        let times = match states_by_time(d) {
+            _ if says_state || documents.len() > 1 => BTreeMap::new(),
+            Err(_) if one_state => BTreeMap::new(),
+            times => times?,
+        };
         for e in &d.entries {
             let i = &e.intrinsics;
             let camera_from_world = camera_from_gl(&e.world_from_camera, &e.place)?;
@@ -42,9 +47,11 @@ pub(super) fn read(src: &Path) -> Result<Source, CaptureError> {
                 camera: Camera { width, height, fx, fy, cx, cy, camera_from_world },
                 lens: Lens { k: [k1, k2, k3, k4], p: [p1, p2], fisheye: i.fisheye },
                 color: numbers::with_image_ending(e.color.clone()),
-                depth: e.depth.clone(),
+                depth: e.depth.clone().map(Grid::File),
                 depth_scale: e.depth_scale,
                 depth_least: 0.0,
+                confidence: None,
+                film_frame: None,
                 mask: e.mask.clone().map_or(MaskFrom::Alpha, MaskFrom::File),
                 occluder: e.occluder_mask.clone(),
                 occluded: e.occluded,
@@ -53,7 +60,8 @@ pub(super) fn read(src: &Path) -> Result<Source, CaptureError> {
         }
     }
     let metric = documents.iter().any(|d| d.metric);
-    Ok(Source { shots, metric, up: documents.first().map_or(DVec3::Z, |d| d.up) })
+    let registered = documents.iter().all(|d| d.registered);
+    Ok(Source { shots, metric, up: documents.first().map_or(DVec3::Z, |d| d.up), registered, notes: Vec::new() })
 }
 
 /// States in the order of time, when there are few times. Keys are bit patterns: times >= 0 sort

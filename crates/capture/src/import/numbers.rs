@@ -2,7 +2,7 @@
 
 use crate::CaptureError;
 use crate::recording::{MAX_RIGIDITY_ERROR, camera_from_gl};
-use glam::{DMat3, DMat4};
+use glam::{DMat3, DMat4, DQuat, DVec3};
 use hingecast_geom::{Camera, Pose, pose::rigidity_error};
 use serde_json::Value;
 use std::path::{Path, PathBuf};
@@ -58,6 +58,29 @@ pub(super) fn pose_from_cv(m: &[[f64; 4]; 4], file: &Path, key: &str) -> Result<
     Ok(Pose::from_mat4(&m))
 }
 
+/// Pose of camera-to-world numbers qx qy qz qw tx ty tz with OpenGL axes.
+pub(super) fn quaternion_pose_from_gl(numbers: &[f64], file: &Path, key: &str) -> Result<Pose, CaptureError> {
+    let cv_from_gl = Pose::new(DQuat::from_xyzw(1.0, 0.0, 0.0, 0.0), DVec3::ZERO);
+    let world_from_gl = rigid(numbers, file, key)?;
+    let gl_from_world = world_from_gl.inverse();
+    Ok(Pose::new(cv_from_gl.rot * gl_from_world.rot, cv_from_gl.rot * gl_from_world.trans))
+}
+
+/// The transform of qx qy qz qw tx ty tz.
+pub(super) fn rigid(numbers: &[f64], file: &Path, key: &str) -> Result<Pose, CaptureError> {
+    /// Numbers with four digits stay below; no quaternion at all does not.
+    const MAX_LENGTH_ERROR: f64 = 1e-2;
+    if let [x, y, z, w, tx, ty, tz] = *numbers
+        && numbers.iter().all(|n| n.is_finite())
+    {
+        let rot = DQuat::from_xyzw(x, y, z, w);
+        if (rot.length() - 1.0).abs() < MAX_LENGTH_ERROR {
+            return Ok(Pose::new(rot.normalize(), DVec3::new(tx, ty, tz)));
+        }
+    }
+    Err(wrong(file, key, "a rotation qx qy qz qw of length 1 and a place tx ty tz"))
+}
+
 /// A pinhole of a 3x3 matrix; `size` 0 x 0 when only the image knows.
 pub(super) fn camera(k: &[[f64; 3]; 3], size: (usize, usize), camera_from_world: Pose) -> Camera {
     Camera { width: size.0, height: size.1, fx: k[0][0], fy: k[1][1], cx: k[0][2], cy: k[1][2], camera_from_world }
@@ -77,6 +100,18 @@ pub(super) fn with_image_ending(path: PathBuf) -> PathBuf {
     let endings = [".png", ".jpg", ".jpeg"];
     let candidates = endings.iter().map(|e| PathBuf::from(format!("{}{e}", path.display())));
     candidates.into_iter().find(|p| p.is_file()).unwrap_or(path)
+}
+
+/// Files of a folder with one of the endings whose names are or end in a number, by that number.
+pub(super) fn numbered(folder: &Path, endings: &[&str]) -> Vec<(usize, PathBuf)> {
+    let number = |p: &PathBuf| {
+        let stem = p.file_stem()?.to_str()?;
+        stem[stem.trim_end_matches(|c: char| c.is_ascii_digit()).len()..].parse().ok()
+    };
+    let mut found: Vec<(usize, PathBuf)> =
+        files(folder, endings).into_iter().filter_map(|p| Some((number(&p)?, p))).collect();
+    found.sort();
+    found
 }
 
 /// Files of a folder with one of the endings, by name.

@@ -35,6 +35,8 @@ pub(super) fn read(src: &Path) -> Result<Vec<Shot>, CaptureError> {
                     depth: None,
                     depth_scale: 1e-3,
                     depth_least: 0.0,
+                    confidence: None,
+                    film_frame: None,
                     mask: MaskFrom::Alpha,
                     occluder: None,
                     occluded: false,

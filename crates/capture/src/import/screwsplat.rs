@@ -2,7 +2,7 @@
 //! OpenCV), `intrinsic.npy`, and maybe `depths/` (.npy in scene units, .png in millimetres).
 
 use super::numbers::{camera, files, image_size, pose_from_cv, rows, wrong};
-use super::{Lens, MaskFrom, Shot, subfolders};
+use super::{Grid, Lens, MaskFrom, Shot, subfolders};
 use crate::recording::images::read_npy;
 use crate::{CaptureError, Split};
 use std::path::Path;
@@ -33,9 +33,11 @@ pub(super) fn read(src: &Path) -> Result<Vec<Shot>, CaptureError> {
                 split: Split::Train,
                 camera: camera(&k, image_size(&color)?, camera_from_world),
                 lens: Lens::default(),
-                depth,
+                depth: depth.map(Grid::File),
                 depth_scale: if in_units { 1.0 } else { 1e-3 },
                 depth_least: 0.0,
+                confidence: None,
+                film_frame: None,
                 mask: MaskFrom::Alpha,
                 occluder: None,
                 occluded: false,

@@ -1,5 +1,10 @@
-//! Decodes the pictures of a source, undistorts them, and writes the native recording.
+//! Decodes the pictures of a source, brings them to one size, undistorts them, and writes the native
+//! recording.
+//!
+//! Depth is never enlarged: where it is smaller than the colour (every phone), colour, mask and camera
+//! are brought to its size. Where it is larger, it is brought to the colour's.
 
+use super::resize::{Size, area_average, majority, nearest, nearest_known, same_shape};
 use super::{MaskFrom, Shot, Source};
 use crate::recording::{images, mask};
 use crate::synth::Staging;
@@ -11,7 +16,14 @@ use std::collections::BTreeMap;
 use std::path::Path;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
-pub(super) fn store(source: &Source, name: &str, out: &Path, progress: &Progress) -> Result<Recording, CaptureError> {
+/// The recording, and what to tell about its pictures.
+pub(super) fn store(
+    source: &Source,
+    name: &str,
+    out: &Path,
+    min_confidence: u8,
+    progress: &Progress,
+) -> Result<(Recording, Vec<String>), CaptureError> {
     let shots = &source.shots;
     let out = std::path::absolute(out).map_err(|e| CaptureError::write(out, e))?;
     let work = Staging::new(&out)?;
@@ -29,15 +41,16 @@ pub(super) fn store(source: &Source, name: &str, out: &Path, progress: &Progress
         })
         .collect();
     let done = AtomicUsize::new(0);
-    let frames: Vec<Frame> = shots
+    let stored: Vec<(Frame, Change)> = shots
         .par_iter()
         .zip(&views)
         .map(|(shot, &view)| {
-            let frame = one(shot, view, &work.path)?;
+            let frame = one(shot, view, &work.path, min_confidence)?;
             progress.report(done.fetch_add(1, Ordering::Relaxed) + 1, shots.len(), "pictures")?;
             Ok(frame)
         })
         .collect::<Result<_, CaptureError>>()?;
+    let (frames, changes): (Vec<Frame>, Vec<Change>) = stored.into_iter().unzip();
     let train_states = frames.iter().filter(|f| f.split == Split::Train).map(|f| f.state + 1).max().unwrap_or(0);
     let recording = Recording {
         root: work.path.clone(),
@@ -46,6 +59,7 @@ pub(super) fn store(source: &Source, name: &str, out: &Path, progress: &Progress
         n_states: train_states,
         metric: source.metric,
         up: source.up,
+        registered: source.registered,
     };
     recording.write()?;
     // Folders that this source did not need; those with files refuse to go.
@@ -54,39 +68,90 @@ pub(super) fn store(source: &Source, name: &str, out: &Path, progress: &Progress
     }
     work.finish()?;
     // What was written should open; if not, the source has gaps in its states.
-    Recording::open(&out)
+    Ok((Recording::open(&out)?, notes(&changes, min_confidence)))
 }
 
-fn one(shot: &Shot, view: usize, root: &Path) -> Result<Frame, CaptureError> {
+/// What happened to a picture on its way.
+struct Change {
+    color: Size,
+    depth: Option<Size>,
+    /// Pixels with depth, and of these those whose confidence was too low.
+    known: usize,
+    unsure: usize,
+}
+
+fn notes(changes: &[Change], min_confidence: u8) -> Vec<String> {
+    let mut resized = BTreeMap::<(Size, Size), usize>::new();
+    for c in changes {
+        let depth = c.depth.filter(|d| *d != c.color);
+        depth.into_iter().for_each(|d| *resized.entry((c.color, d)).or_default() += 1);
+    }
+    let mut notes: Vec<String> = Vec::new();
+    for (((w, h), (dw, dh)), count) in resized {
+        notes.push(if smaller((dw, dh), (w, h)) {
+            format!("colour of {count} pictures was reduced from {w} x {h} to {dw} x {dh}, the size of their depth")
+        } else {
+            format!("depth of {count} pictures was reduced from {dw} x {dh} to {w} x {h}, the size of their colour")
+        });
+    }
+    let (known, unsure) = changes.iter().fold((0, 0), |(k, u), c| (k + c.known, u + c.unsure));
+    if unsure > 0 {
+        notes.push(format!(
+            "{:.1} % of the pixels with depth lost it: their confidence is below {min_confidence} (--min-confidence)",
+            100.0 * unsure as f64 / known as f64
+        ));
+    }
+    notes
+}
+
+fn one(shot: &Shot, view: usize, root: &Path, min_confidence: u8) -> Result<(Frame, Change), CaptureError> {
     let image = images::read(&shot.color)?;
-    let (w, h) = (image.width() as usize, image.height() as usize);
+    let size = (image.width() as usize, image.height() as usize);
     let mut camera = shot.camera;
     if (camera.width, camera.height) == (0, 0) {
-        (camera.width, camera.height) = (w, h);
+        (camera.width, camera.height) = size;
     }
-    if (camera.width, camera.height) != (w, h) {
+    if (camera.width, camera.height) != size {
+        let (w, h) = size;
         return Err(CaptureError::new(
             format!("an image is {w} x {h}, but its camera says {} x {}", camera.width, camera.height),
             shot.color.display().to_string(),
             "import the pictures of the size that the cameras were computed for",
         ));
     }
+    let mut change = Change { color: size, depth: None, known: 0, unsure: 0 };
+    let mut depth = None;
+    if shot.depth.is_some() {
+        let (values, depth_size) = depth_map(shot, min_confidence, &mut change)?;
+        if !same_shape(depth_size, size) {
+            return Err(other_shape(shot, depth_size, size));
+        }
+        change.depth = Some(depth_size);
+        depth = Some(values);
+    }
+    // One size for all: the smaller of colour and depth.
+    let to = change.depth.filter(|d| smaller(*d, size)).unwrap_or(size);
+    let (w, h) = to;
+    let camera = camera.resized(w, h);
+    let depth = depth.zip(change.depth).map(|(z, from)| if from == to { z } else { nearest_known(&z, from, to) });
+
     let has_alpha = image.color().has_alpha();
     let rgba = image.into_rgba8().into_raw();
-    let mask: Option<Vec<u8>> = match &shot.mask {
-        MaskFrom::File(path) => Some(mask_file(path, w, h)?),
-        MaskFrom::Alpha if has_alpha => Some(rgba.chunks_exact(4).map(|p| if p[3] > 127 { 255 } else { 0 }).collect()),
+    let alpha = || rgba.chunks_exact(4).map(|p| if p[3] > 127 { 255 } else { 0 }).collect::<Vec<u8>>();
+    let mask = match &shot.mask {
+        MaskFrom::File(path) => Some(mask_file(path, to)?),
+        MaskFrom::Alpha if has_alpha => Some(majority(&alpha(), size, to)),
         MaskFrom::Alpha => None,
     };
-    let depth = shot.depth.as_ref().map(|path| depth_file(shot, path, w, h)).transpose()?;
-    let hidden = shot.occluder.as_ref().map(|path| mask_file(path, w, h)).transpose()?;
-    let picture = Picture { rgba, mask, depth, hidden };
+    let hidden = shot.occluder.as_ref().map(|path| mask_file(path, to)).transpose()?;
+    let rgb: Vec<u8> = rgba.chunks_exact(4).flat_map(over_white).collect();
+    let rgb = if to == size { rgb } else { area_average::<3>(&rgb, size, to) };
+    let picture = Picture { rgb, mask, depth, hidden };
     let picture = if shot.lens.is_ideal() { picture } else { undistorted(shot, &camera, picture) };
 
     let name = format!("s{:03}_v{view:03}.png", shot.state);
     let file = |folder: &str| root.join(folder).join(&name);
-    let rgb: Vec<u8> = picture.rgba.chunks_exact(4).flat_map(over_white).collect();
-    images::write_rgb(&file("rgb"), &rgb, w, h)?;
+    images::write_rgb(&file("rgb"), &picture.rgb, w, h)?;
     if let Some(mask) = &picture.mask {
         images::write_gray(&file("mask"), mask, w, h)?;
     }
@@ -99,7 +164,7 @@ fn one(shot: &Shot, view: usize, root: &Path) -> Result<Frame, CaptureError> {
         let unit = |z: &f64| (z / depth_scale).round().clamp(0.0, 65_535.0) as u16;
         images::write_depth(&file("depth"), &depth.iter().map(unit).collect::<Vec<u16>>(), w, h)?;
     }
-    Ok(Frame {
+    let frame = Frame {
         state: shot.state,
         view,
         split: shot.split,
@@ -111,11 +176,25 @@ fn one(shot: &Shot, view: usize, root: &Path) -> Result<Frame, CaptureError> {
         occluded: shot.occluded,
         occluder_mask: picture.hidden.as_ref().map(|_| file("occluder")),
         time: shot.time,
-    })
+    };
+    Ok((frame, change))
+}
+
+fn smaller(depth: Size, color: Size) -> bool {
+    depth.0 * depth.1 < color.0 * color.1
+}
+
+fn other_shape(shot: &Shot, depth: Size, color: Size) -> CaptureError {
+    let path = shot.depth.as_ref().map_or(shot.color.as_path(), |d| d.path());
+    CaptureError::new(
+        format!("depth is {} x {}, its colour {} x {}: they show different fields", depth.0, depth.1, color.0, color.1),
+        path.display().to_string(),
+        "bring depth into the colour camera first (the camera's software calls it align), or crop one",
+    )
 }
 
 struct Picture {
-    rgba: Vec<u8>,
+    rgb: Vec<u8>,
     /// 0 or 255.
     mask: Option<Vec<u8>>,
     /// Scene units, 0 = unknown.
@@ -124,22 +203,38 @@ struct Picture {
     hidden: Option<Vec<u8>>,
 }
 
-/// 0 or 255; resized by nearest pixel when it has another size than the colour.
-fn mask_file(path: &Path, w: usize, h: usize) -> Result<Vec<u8>, CaptureError> {
-    let (mask, mw, mh) = mask::read(path)?;
-    Ok(nearest(mw, mh, w, h).map(|i| 255 * mask[i]).collect())
+/// 0 or 255 at the size wanted: by majority where it is larger, by the nearest pixel where it is smaller.
+fn mask_file(path: &Path, to: Size) -> Result<Vec<u8>, CaptureError> {
+    let (mask, w, h) = mask::read(path)?;
+    let from = (w, h);
+    if smaller(to, from) {
+        return Ok(majority(&mask, from, to));
+    }
+    Ok(nearest(from, to).map(|i| 255 * mask[i]).collect())
 }
 
-fn depth_file(shot: &Shot, path: &Path, w: usize, h: usize) -> Result<Vec<f64>, CaptureError> {
-    let (stored, dw, dh) = images::read_depth(path)?;
-    let z = |i: usize| f64::from(stored[i]) * shot.depth_scale;
-    let valid = |z: f64| if z.is_finite() && z > 0.0 && z >= shot.depth_least { z } else { 0.0 };
-    Ok(nearest(dw, dh, w, h).map(|i| valid(z(i))).collect())
-}
-
-/// For each pixel of a w x h image the nearest one of an image of size sw x sh.
-fn nearest(sw: usize, sh: usize, w: usize, h: usize) -> impl Iterator<Item = usize> {
-    (0..w * h).map(move |i| ((i / w) * sh / h) * sw + (i % w) * sw / w)
+/// Depth in scene units at its own size, 0 where it is unknown or not sure enough.
+fn depth_map(shot: &Shot, least: u8, change: &mut Change) -> Result<(Vec<f64>, Size), CaptureError> {
+    let Some(grid) = &shot.depth else { return Ok((Vec::new(), (0, 0))) };
+    let map = grid.depth()?;
+    let size = (map.width, map.height);
+    let valid = |stored: f32| {
+        let z = f64::from(stored) * shot.depth_scale;
+        if z.is_finite() && z > 0.0 && z >= shot.depth_least { z } else { 0.0 }
+    };
+    let mut depth: Vec<f64> = map.values.into_iter().map(valid).collect();
+    change.known = depth.iter().filter(|z| **z > 0.0).count();
+    if let Some(grid) = shot.confidence.as_ref().filter(|_| least > 0) {
+        let sure = grid.confidence()?;
+        let at: Vec<usize> = nearest((sure.width, sure.height), size).collect();
+        for (z, i) in depth.iter_mut().zip(at) {
+            if *z > 0.0 && sure.values[i] < least {
+                *z = 0.0;
+                change.unsure += 1;
+            }
+        }
+    }
+    Ok((depth, size))
 }
 
 /// The source's own unit when 16 bits hold all depths in it, so that nothing is rounded; else a
@@ -162,7 +257,7 @@ fn fine_scale(depth: &[f64], own: f64) -> f64 {
 fn undistorted(shot: &Shot, camera: &Camera, from: Picture) -> Picture {
     let (w, h) = (camera.width, camera.height);
     let n = w * h;
-    let mut rgba = vec![255u8; 4 * n];
+    let mut rgb = vec![255u8; 3 * n];
     let mut unseen = vec![0u8; n];
     let mut mask = from.mask.as_ref().map(|_| vec![0u8; n]);
     let mut depth = from.depth.as_ref().map(|_| vec![0.0; n]);
@@ -190,16 +285,16 @@ fn undistorted(shot: &Shot, camera: &Camera, from: Picture) -> Picture {
         let (tx, ty) = (fx - x0, fy - y0);
         let at = |dx: f64, dy: f64, c: usize| {
             let (x, y) = ((x0 + dx).clamp(0.0, (w - 1) as f64), (y0 + dy).clamp(0.0, (h - 1) as f64));
-            f64::from(from.rgba[4 * (y as usize * w + x as usize) + c])
+            f64::from(from.rgb[3 * (y as usize * w + x as usize) + c])
         };
-        for c in 0..4 {
+        for c in 0..3 {
             let top = at(0.0, 0.0, c) * (1.0 - tx) + at(1.0, 0.0, c) * tx;
             let bottom = at(0.0, 1.0, c) * (1.0 - tx) + at(1.0, 1.0, c) * tx;
-            rgba[4 * i + c] = (top * (1.0 - ty) + bottom * ty).round() as u8;
+            rgb[3 * i + c] = (top * (1.0 - ty) + bottom * ty).round() as u8;
         }
     }
     let hidden = (from.hidden.is_some() || unseen.contains(&255)).then_some(unseen);
-    Picture { rgba, mask, depth, hidden }
+    Picture { rgb, mask, depth, hidden }
 }
 
 fn over_white(p: &[u8]) -> [u8; 3] {

@@ -2,7 +2,8 @@
 //!
 //! Keys of ours, all optional but `state`: per frame `state` (integer), `view`, `time` (seconds),
 //! `occluded` (bool), `occluder_mask_path`; for the whole `name`, `metric` (lengths are metres),
-//! `up` (world direction, default z). Instead of `state` a recording may have one
+//! `up` (world direction, default z), `registered` (false: each state has a world frame of its own,
+//! default true). Instead of `state` a recording may have one
 //! `state_000/transforms.json` per state. Held-out frames are those that nerfstudio's
 //! `test_filenames` lists.
 
@@ -79,6 +80,9 @@ pub struct Recording {
     pub metric: bool,
     /// Unit vector that points up in the world.
     pub up: DVec3,
+    /// All states share one world frame. False: each state's poses are in a world of their own (scans
+    /// that were put together), and nobody has brought them together yet.
+    pub registered: bool,
 }
 
 /// Largest tolerated entry of |R'R - 1|: json files with 4 digits stay below, a scaled or sheared
@@ -112,12 +116,13 @@ impl Recording {
     pub(crate) fn from_documents(documents: &[Document], problems: &mut Vec<Problem>) -> Self {
         let root = documents.first().map(|d| d.root.clone()).unwrap_or_default();
         let (mut frames, mut origins) = (Vec::new(), Vec::new());
-        let (mut name, mut metric, mut up) = (None, false, DVec3::Z);
+        let (mut name, mut metric, mut up, mut registered) = (None, false, DVec3::Z, true);
         for document in documents {
             problems.extend(document.problems.iter().cloned());
             name = name.or_else(|| document.name.clone());
             metric |= document.metric;
             up = document.up;
+            registered &= document.registered;
             let mut next_view = BTreeMap::<usize, usize>::new();
             for entry in &document.entries {
                 let next = next_view.entry(entry.state).or_default();
@@ -142,7 +147,7 @@ impl Recording {
         let n_states = count_states(&frames, documents, problems);
         let folder = || root.file_name().map(|n| n.to_string_lossy().into_owned()).unwrap_or("recording".into());
         let name = name.unwrap_or_else(folder);
-        Self { root, name, frames, n_states, metric, up }
+        Self { root, name, frames, n_states, metric, up, registered }
     }
 
     /// Indices of the usable frames of a state, in file order; wholly occluded frames are left out.

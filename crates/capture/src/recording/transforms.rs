@@ -54,6 +54,7 @@ pub(crate) struct Document {
     pub name: Option<String>,
     pub metric: bool,
     pub up: DVec3,
+    pub registered: bool,
     pub problems: Vec<Problem>,
 }
 
@@ -134,10 +135,12 @@ pub(crate) fn parse(root: &Path, file: &Path, folder_state: DefaultState) -> Res
         name: None,
         metric: false,
         up: DVec3::Z,
+        registered: true,
         problems: Vec::new(),
     };
     keep(top.text("name").map(|t| document.name = t.map(String::from)));
     keep(top.flag("metric").map(|m| document.metric = m.unwrap_or(false)));
+    keep(top.flag("registered").map(|r| document.registered = r.unwrap_or(true)));
     keep(top.numbers("up").and_then(|up| match up.map(DVec3::from_array).map(|u| (u, u.try_normalize())) {
         None => Ok(()),
         Some((_, Some(unit))) => {

@@ -22,6 +22,9 @@ impl Recording {
         top.insert("name".into(), json!(self.name));
         top.insert("metric".into(), json!(self.metric));
         top.insert("up".into(), json!(self.up.to_array()));
+        if !self.registered {
+            top.insert("registered".into(), json!(false));
+        }
         let names =
             |split| self.frames.iter().filter(|f| f.split == split).map(|f| relative(&self.root, &f.color)).collect();
         let (train, test): (Vec<String>, Vec<String>) = (names(Split::Train), names(Split::Test));

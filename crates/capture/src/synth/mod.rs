@@ -122,6 +122,7 @@ pub fn synth(
         n_states: config.states,
         metric: object.metric,
         up: DVec3::Z,
+        registered: true,
     };
     recording.write()?;
     if let Some(truth) = truth_work {

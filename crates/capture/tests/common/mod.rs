@@ -1,6 +1,8 @@
 //! What several tests need.
 #![allow(dead_code)]
 
+pub mod dots;
+
 use hingecast_capture::object::ArticulatedObject;
 use hingecast_capture::synth::{SynthConfig, SynthReport, World, synth};
 use hingecast_capture::{Recording, Truth};

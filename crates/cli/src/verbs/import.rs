@@ -3,13 +3,30 @@
 use super::{Outcome, Session};
 use crate::cli::Import;
 use hingecast::failure::Result;
-use hingecast_capture::import::{Format, import};
+use hingecast_capture::import::{Config, Format, import};
 
 pub fn run(session: &Session, args: &Import) -> Result<Outcome> {
-    let format = Format::from_name(&args.format)?;
-    let report = import(&args.source, &args.out, format, &session.ui.stage("import"))?;
-    session.ui.say(&format!("imported {} frames -> {}", report.frames, report.recording.display()));
+    let config = Config {
+        format: Format::from_name(&args.format)?,
+        min_confidence: args.min_confidence,
+        every: args.every,
+        max_views: args.max_views,
+    };
+    let report = import(&args.sources, &args.out, &config, &session.ui.stage("import"))?;
+    report.notes.iter().for_each(|note| session.ui.say(&format!("note: {note}")));
+    session.ui.say(&format!(
+        "imported {} frames in {} states -> {}",
+        report.frames,
+        report.states,
+        report.recording.display()
+    ));
     session.ui.say(&format!("next: hingecast check {}", report.recording.display()));
-    session.answer(&serde_json::json!({ "recording": report.recording, "frames": report.frames }))?;
+    session.answer(&serde_json::json!({
+        "recording": report.recording,
+        "formats": report.formats,
+        "states": report.states,
+        "frames": report.frames,
+        "notes": report.notes,
+    }))?;
     Ok(Outcome::Done)
 }
