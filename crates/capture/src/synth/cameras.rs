@@ -1,5 +1,5 @@
-//! Cameras on the upper hemisphere around the object, all at one distance, looking at its centre; and
-//! the distance at which it is all in the picture.
+//! Cameras on the upper hemisphere around the object, all at one distance, looking at its centre;
+//! and the distance at which it is all in the picture.
 
 use super::trajectory::Stand;
 use super::world::{Lens, Placement};
@@ -57,8 +57,8 @@ impl Subject {
         Self { centre: 0.5 * (lo + hi), points }
     }
 
-    /// Smallest distance of cameras at `stands` at which all points stay within the frame, were each
-    /// held upright.
+    /// Smallest distance of cameras at `stands` at which all points stay within the frame, were
+    /// each held upright.
     pub fn distance<'a>(&self, stands: impl Iterator<Item = &'a Stand>, optics: &Optics) -> f64 {
         let [across, down] = optics.slopes;
         let mut distance = 0.0f64;
