@@ -33,8 +33,8 @@ pub struct Truth {
     /// `world_from_object[s] * tree.poses_at(s)[i]`. Empty: it is never pushed.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub world_from_object: Vec<Pose>,
-    /// The frame of reference in which the recording states the cameras of each state, from the true
-    /// world. Empty: the true world in all states.
+    /// The frame of reference in which the recording states the cameras of each state, from the
+    /// true world. Empty: the true world in all states.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub recording_from_world: Vec<Pose>,
 }

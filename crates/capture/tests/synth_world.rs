@@ -24,7 +24,8 @@ fn a_room_fills_the_pictures_and_keeps_away_from_object_and_cameras() {
     for seed in 0..3 {
         let config = SynthConfig { seed, ..with(World { scene: Scenery::Room, ..Default::default() }) };
         let (recording, truth) = made(dir.path(), &config);
-        // The lid opens from the front at -y: the wall is at +y, 1 to 3 cm behind what comes nearest.
+        // The lid opens from the front at -y: the wall is at +y, 1 to 3 cm behind what comes
+        // nearest.
         let object: Vec<DVec3> =
             (0..recording.frames.len()).flat_map(|f| points(&recording, &truth, f, true)).collect();
         let around: Vec<DVec3> =
@@ -197,7 +198,8 @@ fn pushes_that_make_no_sense_are_refused() {
     assert_eq!("12:1.5".parse(), Ok(Push { mm: 12.0, deg: 1.5, states: vec![] }));
 }
 
-/// Settings of older versions are read, and settings without a world are written as they wrote them.
+/// Settings of older versions are read, and settings without a world are written as they wrote
+/// them.
 #[test]
 fn settings_without_a_world_do_not_mention_it() {
     let plain = serde_json::to_value(small()).unwrap();

@@ -137,9 +137,9 @@ pub struct SynthSettings {
     #[arg(long, default_value_t = 256, value_name = "PIXELS")]
     pub size: usize,
     /// Sensor model: `none` is exact; `d435` has depth noise, holes, colour noise, ragged masks and
-    /// poses off by 0.5 deg and 3 mm. `stereo` (blotches of 8 to 20 pixels, 3 mm at 1 m, growing with
-    /// the square; holes) and `tof` (smooth, pixels that fly at edges, dark and steep surfaces too far
-    /// by some mm) change depth and colour alone.
+    /// poses off by 0.5 deg and 3 mm. `stereo` (blotches of 8 to 20 pixels, 3 mm at 1 m, growing
+    /// with the square; holes) and `tof` (smooth, pixels that fly at edges, dark and steep surfaces
+    /// too far by some mm) change depth and colour alone.
     #[arg(long, default_value = "none", value_parser = words::<Noise>(&["none", "d435", "stereo", "tof"]))]
     pub noise: Noise,
     /// A hand and forearm reach in on this share of the training frames [default without a value:

@@ -23,8 +23,8 @@ pub struct SynthConfig {
     pub size: usize,
     /// Field of view, degrees; 40 is a phone's main camera upright.
     pub fov_deg: f64,
-    /// The same cameras for all states (a rig); false: a person walks around anew for each state, as
-    /// on a `Trajectory::Walk` always.
+    /// The same cameras for all states (a rig); false: a person walks around anew for each state,
+    /// as on a `Trajectory::Walk` always.
     pub same_cameras: bool,
     /// Joint name -> first and last value of its play, radians or scene units. Others get their
     /// useful range.

@@ -8,6 +8,7 @@ mod cameras;
 mod config;
 mod coupled;
 mod drift;
+mod framing;
 mod noise;
 mod occluder;
 mod output;
@@ -204,7 +205,7 @@ impl Studio<'_> {
                 let mut camera = shot.camera;
                 let segmented = (train && self.config.world.masks == Masks::Sam).then(|| {
                     let mut mask = exposure.mask.clone();
-                    let mut rng = fastrand::Rng::with_seed((seed ^ 0x7361_6d).wrapping_mul(0x9e37_79b9_7f4a_7c15));
+                    let mut rng = fastrand::Rng::with_seed((seed ^ 0x0073_616d).wrapping_mul(0x9e37_79b9_7f4a_7c15));
                     world::masks::segmenter(&mut mask, camera.width, camera.height, &mut rng);
                     mask
                 });

@@ -1,10 +1,10 @@
 //! Which joint values and which cameras a recording has.
 
-use super::cameras::Optics;
 use super::coupled::{self, useful_ranges};
+use super::framing::{Optics, Subject};
 use super::ranges::UsefulRange;
 use super::world::{Placement, Site, Trajectory};
-use super::{SynthConfig, cameras, play, trajectory};
+use super::{SynthConfig, play, trajectory};
 use crate::object::ArticulatedObject;
 use crate::{CaptureError, Split};
 use glam::{DVec3, Vec3};
@@ -86,7 +86,7 @@ pub(super) fn shots(
         Some(lens) => Optics::of(lens),
         None => Optics::square(config.size, config.fov_deg.to_radians()),
     };
-    let subject = cameras::Subject::new(object, states, placement);
+    let subject = Subject::new(object, states, placement);
     let way = config.world.trajectory;
     let stands = |salt: u64, n: usize| {
         let mut rng = fastrand::Rng::with_seed(config.seed.wrapping_mul(0x9e37_79b9) ^ salt);

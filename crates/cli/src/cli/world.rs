@@ -15,24 +15,24 @@ pub struct WorldSettings {
     /// [default: --size, with a field of view of 40 deg].
     #[arg(long, value_name = "NAME|W,H,FX,FY,CX,CY", conflicts_with = "size")]
     pub camera: Option<Lens>,
-    /// Where cameras go: all around from above; a hand-held arc of 200 deg around the front, anew in
-    /// each state; or within 70 deg of the front.
+    /// Where cameras go: all around from above; a hand-held arc of 200 deg around the front, anew
+    /// in each state; or within 70 deg of the front.
     #[arg(long, default_value = "hemisphere", value_parser = words::<Trajectory>(&["hemisphere", "walk", "front"]))]
     pub trajectory: Trajectory,
-    /// Poses of training frames drift along the way of each state, in the order of the views, by up to
-    /// DEG degrees and MM millimetres; the first is right [default: no drift].
+    /// Poses of training frames drift along the way of each state, in the order of the views, by up
+    /// to DEG degrees and MM millimetres; the first is right [default: no drift].
     #[arg(long, value_name = "DEG:MM")]
     pub drift: Option<Drift>,
     /// Masks of the training frames: `true` to the sensor, `none` (nor for test frames), or `sam`:
     /// ragged by 1 to 3 pixels, with holes, now and then with a piece too much or missing.
     #[arg(long, default_value = "true", value_parser = words::<Masks>(&["true", "none", "sam"]))]
     pub masks: Masks,
-    /// Frames of reference: `per-state` turns each state's cameras but the first's about `up` by 0 to
-    /// 360 deg and shifts them by up to 2 m, as phone scans are; `tilted` turns them in any way.
+    /// Frames of reference: `per-state` turns each state's cameras but the first's about `up` by 0
+    /// to 360 deg and shifts them by up to 2 m, as phone scans are; `tilted` turns them in any way.
     #[arg(long, default_value = "shared", value_parser = words::<Frames>(&["shared", "per-state", "tilted"]))]
     pub frames: Frames,
-    /// The object is pushed by MM millimetres and turned by DEG degrees, 2 unless given, between two
-    /// states, and stays there [default: not pushed].
+    /// The object is pushed by MM millimetres and turned by DEG degrees, 2 unless given, between
+    /// two states, and stays there [default: not pushed].
     #[arg(long, value_name = "MM[:DEG]")]
     pub push: Option<Push>,
     /// First states after a push each [default: one, which the seed picks].

@@ -4,8 +4,8 @@ use hingecast_geom::Camera;
 
 /// A jump of more than this share of z is an edge.
 const EDGE_JUMP: f32 = 0.03;
-/// Steeper than this against the ray, sensors start to lose a surface; at the second slope they have
-/// lost it. Tangents of 70 and 82 degrees.
+/// Steeper than this against the ray, sensors start to lose a surface; at the second slope they
+/// have lost it. Tangents of 70 and 82 degrees.
 const GRAZING: [f64; 2] = [2.75, 7.1];
 
 /// Around one pixel.

@@ -1,6 +1,6 @@
-//! Depth of a stereo camera as far as neighbouring pixels share its errors: blotches as large as the
-//! matching window, which grow with the square of the distance; holes in one piece at depth edges
-//! and where surfaces are seen at a grazing angle.
+//! Depth of a stereo camera as far as neighbouring pixels share its errors: blotches as large as
+//! the matching window, which grow with the square of the distance; holes in one piece at depth
+//! edges and where surfaces are seen at a grazing angle.
 //!
 //! z = f b / d: an error of s pixels in the disparity d is one of s z^2 / (f b) in z.
 
@@ -19,15 +19,18 @@ const BLOTCH: [f64; 2] = [8.0, 20.0];
 const SHARED: f64 = 0.09;
 const OWN: f64 = 0.02;
 const STEP: f64 = 1.0 / 32.0;
-/// Holes reach this many pixels from an edge, and are pieces of about this size, pixels.
-const FROM_EDGE: usize = 2;
+/// Holes are pieces of about this size, pixels; they reach one pixel from an edge for so many
+/// columns of the picture, and take this share of what is there.
 const HOLE: f64 = 5.0;
+const COLUMNS_PER_EDGE: usize = 320;
+const AT_EDGE: f64 = 0.45;
 /// Farther than this nothing is matched, m.
 const FARTHEST: f64 = 8.0;
 
 pub(super) fn depth(e: &mut Exposure, camera: &Camera, metres_per_unit: f64, rng: &mut fastrand::Rng) {
     let (w, h) = (camera.width, camera.height);
     let exact = e.depth.clone();
+    let reach = (w / COLUMNS_PER_EDGE).max(1);
     let size = BLOTCH[0] + (BLOTCH[1] - BLOTCH[0]) * rng.f64();
     let (blotches, holes) = (Smooth::new(w, h, size, rng), Smooth::new(w, h, HOLE, rng));
     let shapes: Vec<Option<Shape>> =
@@ -38,10 +41,10 @@ pub(super) fn depth(e: &mut Exposure, camera: &Camera, metres_per_unit: f64, rng
         let (x, y) = (i % w, i / w);
         let metres = f64::from(exact[i]) * metres_per_unit;
         let on_edge = |i: usize| shapes[i].as_ref().is_some_and(|s| s.step);
-        let beside = |k: usize, n: usize| k.saturating_sub(FROM_EDGE)..(k + FROM_EDGE + 1).min(n);
+        let beside = |k: usize, n: usize| k.saturating_sub(reach)..(k + reach + 1).min(n);
         let near_edge = beside(y, h).any(|y| beside(x, w).any(|x| on_edge(y * w + x)));
         // The field is about -1 .. 1: a loss of one half takes its upper half.
-        let loss = shape.grazing_loss().max(if near_edge { 0.55 } else { 0.0 });
+        let loss = shape.grazing_loss().max(if near_edge { AT_EDGE } else { 0.0 });
         if metres > FARTHEST || loss > 0.0 && loss > 0.5 - 0.5 * holes.at(x, y) {
             e.depth[i] = 0.0;
             continue;

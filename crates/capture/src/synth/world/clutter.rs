@@ -181,10 +181,11 @@ fn near(eye: DVec3, at: DVec2, piece: &Piece, distance: f64) -> bool {
     eye.z < piece.height + distance && apart(eye.truncate(), DVec2::ZERO, at, piece.half) < distance
 }
 
-/// Points that cameras should see: the middle of the object's space, and its sides at half height.
+/// Points that cameras should see: the middle of the object's space and its sides, below half
+/// height.
 fn targets(site: &Site) -> [DVec3; 5] {
     let [along, away] = site.footprint();
-    let height = 0.5 * (site.lo.z + site.hi.z) - site.floor;
+    let height = 0.3 * (site.hi.z - site.floor);
     let at =
         |a: f64, b: f64| DVec3::new(along[0] + a * (along[1] - along[0]), away[0] + b * (away[1] - away[0]), height);
     [at(0.5, 0.5), at(0.05, 0.5), at(0.95, 0.5), at(0.5, 0.05), at(0.5, 0.95)]

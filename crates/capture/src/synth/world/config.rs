@@ -51,7 +51,8 @@ pub enum Masks {
     True,
     /// No mask files.
     None,
-    /// As a segmenter makes them: ragged, with holes, now and then with a piece too much or missing.
+    /// As a segmenter makes them: ragged, with holes, now and then with a piece too much or
+    /// missing.
     Sam,
 }
 
@@ -84,8 +85,8 @@ pub enum Trajectory {
     Front,
 }
 
-/// Drift of a tracker along the way of each state: the poses of its training frames, in order, wander
-/// off smoothly; the first is right, the worst is off by this.
+/// Drift of a tracker along the way of each state: the poses of its training frames, in order,
+/// wander off smoothly; the first is right, the worst is off by this.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Drift {
@@ -103,8 +104,8 @@ pub struct Push {
     pub mm: f64,
     /// How far it turns about the vertical through its middle, degrees, to either side.
     pub deg: f64,
-    /// The first states after a push each, 1 .. states - 1; pushes add up. Empty: one push, before a
-    /// state that the seed picks.
+    /// The first states after a push each, 1 .. states - 1; pushes add up. Empty: one push, before
+    /// a state that the seed picks.
     #[serde(default)]
     pub states: Vec<usize>,
 }

@@ -11,8 +11,8 @@ const UPRIGHT: f64 = 0.7;
 /// The horizontal axis direction (+-x or +-y) towards which the parts open; -y if none does.
 ///
 /// A drawer opens the way it slides. A door (upright axis) shows, once open, from its hinge to the
-/// front. A lid or flap (lying axis) lies in front of its hinge when it is closed (a lid) or when it
-/// is open (the flap of an oven). Large parts count more.
+/// front. A lid or flap (lying axis) lies in front of its hinge when it is closed (a lid) or when
+/// it is open (the flap of an oven). Large parts count more.
 pub(crate) fn front(object: &ArticulatedObject, ranges: &[UsefulRange]) -> DVec3 {
     let mut ahead = DVec3::ZERO;
     for (joint, range) in object.tree.joints.iter().zip(ranges) {

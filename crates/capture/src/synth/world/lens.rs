@@ -34,8 +34,8 @@ impl Lens {
         Self { width, height, fx: self.fx * sx, fy: self.fy * sy, cx: self.cx * sx, cy: self.cy * sy }
     }
 
-    /// Whether pictures are of a size that is rendered, 8 to 4096 pixels, with the principal point in
-    /// their middle half and a field of view from 5 to 120 degrees.
+    /// Whether pictures are of a size that is rendered, 8 to 4096 pixels, with the principal point
+    /// in their middle half and a field of view from 5 to 120 degrees.
     pub fn is_sane(&self) -> bool {
         let one = |n: usize, f: f64, c: f64| {
             let half = 0.5 * n as f64;

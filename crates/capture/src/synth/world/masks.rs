@@ -28,12 +28,15 @@ pub(crate) fn segmenter(mask: &mut [u8], w: usize, h: usize, rng: &mut fastrand:
     let (a, b, c) = (of_size(HOLE, rng), of_size(PIECE, rng), of_size(PIECE, rng));
     let mut blob = |wanted: bool, among: &[usize], radius: f64, value: u8, rng: &mut fastrand::Rng| {
         let shape = Smooth::new(w, h, (0.5 * radius).max(2.0), rng);
-        let Some(&centre) = (!among.is_empty()).then(|| &among[rng.usize(0..among.len())]) else { return };
-        let centre = DVec2::new((centre % w) as f64, (centre / w) as f64);
-        for i in (0..if wanted { mask.len() } else { 0 }).rev() {
-            let (x, y) = (i % w, i / w);
-            if DVec2::new(x as f64, y as f64).distance(centre) < radius * (1.0 + 0.25 * shape.at(x, y)) {
-                mask[i] = value;
+        let place = rng.f64();
+        if !wanted || among.is_empty() {
+            return;
+        }
+        let at = |i: usize| DVec2::new((i % w) as f64, (i / w) as f64);
+        let centre = at(among[(place * among.len() as f64) as usize]);
+        for (i, pixel) in mask.iter_mut().enumerate() {
+            if at(i).distance(centre) < radius * (1.0 + 0.25 * shape.at(i % w, i / w)) {
+                *pixel = value;
             }
         }
     };

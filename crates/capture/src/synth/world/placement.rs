@@ -35,9 +35,8 @@ impl Placement {
             times.iter().map(at).collect()
         });
         let own = (config.world.frames != Frames::Shared).then(|| {
-            let frame = |s: usize| {
-                if s == 0 || s >= config.states { Pose::IDENTITY } else { frame(config, s, 1.0 / metres_per_unit) }
-            };
+            let moved = |s: usize| s > 0 && s < config.states;
+            let frame = |s: usize| if moved(s) { own_frame(config, s, 1.0 / metres_per_unit) } else { Pose::IDENTITY };
             (0..times.len()).map(frame).collect()
         });
         Self { world_from_object: pushed.unwrap_or_default(), recording_from_world: own.unwrap_or_default() }
@@ -90,7 +89,7 @@ fn pushes(object: &ArticulatedObject, config: &SynthConfig, push: &Push, front: 
 }
 
 /// `recording_from_world` of a state. `metre`: scene units.
-fn frame(config: &SynthConfig, state: usize, metre: f64) -> Pose {
+fn own_frame(config: &SynthConfig, state: usize, metre: f64) -> Pose {
     let seed = config.seed ^ 0x6672_616d_6573 ^ ((state as u64) << 40);
     let mut rng = fastrand::Rng::with_seed(seed.wrapping_mul(0x9e37_79b9_7f4a_7c15));
     let mut direction = || DVec3::new(normal(&mut rng), normal(&mut rng), normal(&mut rng)).normalize_or(DVec3::X);
