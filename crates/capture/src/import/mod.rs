@@ -5,6 +5,8 @@
 //! several sources together, a state each.
 
 mod artgs;
+mod bop;
+mod colmap;
 mod dta;
 mod dynamic3dgs;
 mod film;
@@ -23,6 +25,7 @@ mod screwsplat;
 mod store;
 mod stray;
 mod thin;
+mod tum;
 mod unpack;
 
 pub use format::{Format, detect};
@@ -154,6 +157,8 @@ pub(crate) enum MaskFrom {
     /// The colour image's alpha, if it has one.
     Alpha,
     File(PathBuf),
+    /// Whatever one of several files shows: a file for each thing.
+    Any(Vec<PathBuf>),
 }
 
 /// Converts sources into a native recording at `out`. One source may have several states; several
@@ -244,6 +249,9 @@ fn read(src: &Path, format: Format, several: bool) -> Result<Source, CaptureErro
         Format::Scanner3d => scanner3d::read(src)?,
         Format::Stray => stray::read(src)?,
         Format::Polycam => polycam::read(src)?,
+        Format::Colmap => colmap::read(src)?,
+        Format::Bop => bop::read(src)?,
+        Format::Tum => tum::read(src)?,
     })
 }
 
