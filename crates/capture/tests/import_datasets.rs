@@ -1,5 +1,5 @@
-//! COLMAP, BOP, TUM RGB-D and instant-ngp: layouts of desks rather than of phones, each written by hand around
-//! one known 3D point a state.
+//! COLMAP, BOP, TUM RGB-D and instant-ngp: layouts of desks rather than of phones, each written by
+//! hand around one known 3D point a state.
 
 mod common;
 

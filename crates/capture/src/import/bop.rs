@@ -1,9 +1,11 @@
-//! BOP, one scene: `scene_camera.json` (per picture `cam_K` row by row, `depth_scale`, `cam_R_w2c`, `cam_t_w2c`),
-//! `rgb/` or `gray/`, `depth/` (16-bit PNG; value x depth_scale = mm), `mask_visib/<picture>_<object>.png`.
-//! World-to-camera, OpenCV axes, mm; pixel centres at whole numbers.
+//! BOP, one scene: `scene_camera.json` (per picture `cam_K` row by row, `depth_scale`, `cam_R_w2c`,
+//! `cam_t_w2c`), `rgb/` or `gray/`, `depth/` (16-bit PNG; value x depth_scale = mm),
+//! `mask_visib/<picture>_<object>.png`. World-to-camera, OpenCV axes, mm; pixel centres at whole
+//! numbers.
 //!
-//! Scenes without `cam_R_w2c` hold still objects before a camera that moved: if `scene_gt.json` has one object
-//! that is in every picture once - a marker, say -, its frame is the world, and its mask is no part of the object.
+//! Scenes without `cam_R_w2c` hold still objects before a camera that moved: if `scene_gt.json` has
+//! one object that is in every picture once - a marker, say -, its frame is the world, and its mask
+//! is no part of the object.
 
 use super::grid::Grid;
 use super::numbers::{camera, image_size, json, matrix, pose_from_cv, with_image_ending, wrong};

@@ -1,8 +1,8 @@
 //! The layouts that can be imported: their names, and how each is told from the others.
 
-use super::colmap;
 use super::numbers::numbered;
 use super::subfolders;
+use super::{colmap, foreign};
 use crate::CaptureError;
 use serde::{Deserialize, Serialize};
 use std::path::{Path, PathBuf};
@@ -96,6 +96,9 @@ pub fn detect(src: &Path) -> Result<Format, CaptureError> {
                     "give each as a source, in the order of the states: hingecast import {list}{more} -o RECORDING"
                 ),
             );
+        }
+        if let Some(error) = foreign::inside(src) {
+            return error;
         }
         let names: Vec<&str> = Format::ALL[1..].iter().map(|(name, _)| *name).collect();
         CaptureError::new(

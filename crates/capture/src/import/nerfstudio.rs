@@ -73,8 +73,8 @@ pub(super) fn read(src: &Path, one_state: bool) -> Result<Source, CaptureError> 
     Ok(source)
 }
 
-/// NeRFCapture (a phone's app) writes instant-ngp's keys and leaves the endings of pictures away. Its world is
-/// ARKit's: metres, y up.
+/// NeRFCapture (a phone's app) writes instant-ngp's keys and leaves the endings of pictures away.
+/// Its world is ARKit's: metres, y up.
 fn is_nerf_capture(d: &Document) -> bool {
     let has = |key: &str| d.value.get(key).is_some();
     let without_ending = |f: &serde_json::Value| {

@@ -1,8 +1,8 @@
-//! Decodes the pictures of a source, brings them to one size, undistorts them, and writes the native
-//! recording.
+//! Decodes the pictures of a source, brings them to one size, undistorts them, and writes the
+//! native recording.
 //!
-//! Depth is never enlarged: where it is smaller than the colour (every phone), colour, mask and camera
-//! are brought to its size. Where it is larger, it is brought to the colour's.
+//! Depth is never enlarged: where it is smaller than the colour (every phone), colour, mask and
+//! camera are brought to its size. Where it is larger, it is brought to the colour's.
 
 use super::resize::{Size, area_average, majority, nearest, nearest_known, same_shape};
 use super::{MaskFrom, Shot, Source};
@@ -204,7 +204,8 @@ struct Picture {
     hidden: Option<Vec<u8>>,
 }
 
-/// 0 or 255 at the size wanted: by majority where it is larger, by the nearest pixel where it is smaller.
+/// 0 or 255 at the size wanted: by majority where it is larger, by the nearest pixel where it is
+/// smaller.
 fn mask_file(path: &Path, to: Size) -> Result<Vec<u8>, CaptureError> {
     let (mask, w, h) = mask::read(path)?;
     let from = (w, h);

@@ -1,9 +1,11 @@
-//! TUM RGB-D and what is stored like it: `rgb.txt`, `depth.txt` (time, file), `groundtruth.txt` (time, tx ty tz,
-//! qx qy qz qw: camera-to-world, OpenCV axes, z up, metres); depth is 16-bit PNG, 5000 a metre.
-//! `associations.txt` (time, file, time, file), where there is one, says which depth belongs to which picture.
+//! TUM RGB-D and what is stored like it: `rgb.txt`, `depth.txt` (time, file), `groundtruth.txt`
+//! (time, tx ty tz, qx qy qz qw: camera-to-world, OpenCV axes, z up, metres); depth is 16-bit PNG,
+//! 5000 a metre. `associations.txt` (time, file, time, file), where there is one, says which depth
+//! belongs to which picture.
 //!
-//! Intrinsics are in no file of TUM's own: `calibration.txt` (fx fy cx cy, as OpenCV has them: pixel centres at
-//! whole numbers), else, for the `freiburg` sequences, the values that their page recommends.
+//! Intrinsics are in no file of TUM's own: `calibration.txt` (fx fy cx cy, as OpenCV has them:
+//! pixel centres at whole numbers), else, for the `freiburg` sequences, the values that their page
+//! recommends.
 
 use super::grid::Grid;
 use super::numbers::{image_size, rigid, wrong};
@@ -12,7 +14,8 @@ use crate::CaptureError;
 use hingecast_geom::{Camera, Pose};
 use std::path::{Path, PathBuf};
 
-/// Depth and pose belong to a picture of at most so many seconds before or after, as in TUM's own tool.
+/// Depth and pose belong to a picture of at most so many seconds before or after, as in TUM's own
+/// tool.
 const APART: f64 = 0.02;
 const METRES_PER_UNIT: f64 = 1.0 / 5000.0;
 /// fx fy cx cy of Kinect as ROS has them: depth was aligned with these.

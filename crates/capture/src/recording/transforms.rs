@@ -228,7 +228,8 @@ fn entry(
     })
 }
 
-/// The depth file and the scene units of its unit: nerfstudio's keys, or those of instant-ngp and NeRFCapture.
+/// The depth file and the scene units of its unit: nerfstudio's keys, or those of instant-ngp and
+/// NeRFCapture.
 fn depth(f: &Fields, folder: &Path) -> Result<(Option<PathBuf>, f64), CaptureError> {
     let nerfstudio = f.text("depth_file_path")?;
     let scales: &[&str] = match nerfstudio {

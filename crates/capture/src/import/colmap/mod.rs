@@ -1,11 +1,12 @@
 //! COLMAP's sparse models, text or binary, before and since rigs (3.12), with depth beside them.
 //!
-//! `cameras`, `images`, `points3D`, since 3.12 `rigs` and `frames`, in the folder, in `sparse/` or in `sparse/0/`;
-//! pictures in `images/`. Poses are world-to-camera, OpenCV axes, w first; pixel centres at +0.5. Pictures in
-//! several folders of `images/` are several states: one model of all of them shares a world.
+//! `cameras`, `images`, `points3D`, since 3.12 `rigs` and `frames`, in the folder, in `sparse/` or
+//! in `sparse/0/`; pictures in `images/`. Poses are world-to-camera, OpenCV axes, w first; pixel
+//! centres at +0.5. Pictures in several folders of `images/` are several states: one model of all
+//! of them shares a world.
 //!
-//! COLMAP makes no depth: `depth/<name>.png` (millimetres) or `.npy`, `.exr` (metres) is the sensor's, `masks/<name>.png`
-//! anybody's. COLMAP's unit is its own: see `scale`.
+//! COLMAP makes no depth: `depth/<name>.png` (millimetres) or `.npy`, `.exr` (metres) is the
+//! sensor's, `masks/<name>.png` anybody's. COLMAP's unit is its own: see `scale`.
 
 mod binary;
 mod model;
@@ -78,8 +79,8 @@ fn project(src: &Path, model: &Path) -> PathBuf {
     if src.join("images").is_dir() { src.to_path_buf() } else { above.unwrap_or(src).to_path_buf() }
 }
 
-/// Names of states: the first folders of the pictures' names. The cameras of a rig have a folder each,
-/// too: those are no states.
+/// Names of states: the first folders of the pictures' names. The cameras of a rig have a folder
+/// each, too: those are no states.
 fn states(model: &Model) -> Vec<String> {
     if model.has_rigs {
         return vec![String::new()];

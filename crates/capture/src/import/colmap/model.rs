@@ -142,3 +142,30 @@ pub(super) fn assemble(
     }
     Ok(Model { cameras, images, points, has_rigs: rigs.values().any(|r| r.len() > 1) })
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// The second camera of a rig stands beside the first; what `images` says of either is old.
+    #[test]
+    fn cameras_of_a_rig_stand_where_the_rig_does() {
+        let old = Pose::from_trans(DVec3::new(9.0, 9.0, 9.0));
+        let image = |id, camera| Image { id, camera, name: id.to_string(), camera_from_world: old, seen: vec![] };
+        let mut images = vec![image(4, 1), image(5, 2), image(6, 1)];
+        let turned = Pose::new(DQuat::from_rotation_y(0.3), DVec3::new(-0.1, 0.0, 0.0));
+        let rigs = Rigs::from([(7, BTreeMap::from([(1, Some(Pose::IDENTITY)), (2, Some(turned))]))]);
+        let rig_from_world = Pose::new(DQuat::from_rotation_z(1.0), DVec3::new(1.0, 2.0, 3.0));
+        let frames = [RigFrame { rig: 7, rig_from_world, images: vec![(1, 4), (2, 5)] }];
+        pose_by_frames(&mut images, &rigs, &frames, Path::new("frames.txt")).unwrap();
+        // Image 6 is in no frame: it was never registered.
+        assert_eq!(images.iter().map(|i| i.id).collect::<Vec<_>>(), [4, 5]);
+        let point = DVec3::new(0.5, -0.2, 0.7);
+        assert_eq!(images[0].camera_from_world, rig_from_world);
+        let expected = turned.apply(rig_from_world.apply(point));
+        assert!((images[1].camera_from_world.apply(point) - expected).length() < 1e-12);
+        // A camera without a place in its rig.
+        let unknown = Rigs::from([(7, BTreeMap::from([(1, Some(Pose::IDENTITY)), (2, None)]))]);
+        assert!(pose_by_frames(&mut images, &unknown, &frames, Path::new("frames.txt")).is_err());
+    }
+}

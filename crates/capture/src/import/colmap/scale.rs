@@ -1,5 +1,5 @@
-//! How long COLMAP's unit is, by a sensor's depth: each point of the model that a picture shows has a depth
-//! in the model and one in the depth map. The scale is the median of their quotients.
+//! How long COLMAP's unit is, by a sensor's depth: each point of the model that a picture shows has
+//! a depth in the model and one in the depth map. The scale is the median of their quotients.
 
 use super::super::Source;
 use super::model::Model;
@@ -38,7 +38,7 @@ pub(super) fn to_metres(source: &mut Source, model: &Model) -> Result<(), Captur
     }
     if quotients.len() < LEAST {
         source.notes.push(format!(
-            "COLMAP's unit is its own, and only {} points have a depth to compare: it is taken for the depth's (metres)",
+            "COLMAP's unit is its own, and only {} points have a depth to compare: it is taken for a metre",
             quotients.len()
         ));
         return Ok(());
@@ -62,7 +62,8 @@ pub(super) fn to_metres(source: &mut Source, model: &Model) -> Result<(), Captur
     }
     source.metric = true;
     source.notes.push(format!(
-        "one unit of the COLMAP model is {scale:.4} m, by the depth at {} points (middle half within {:.1} %): poses were brought to metres",
+        "one unit of the COLMAP model is {scale:.4} m, by the depth at {} points (half of them within {:.1} %); poses \
+         were brought to metres",
         quotients.len(),
         100.0 * spread
     ));
