@@ -172,7 +172,7 @@ fn record3d_of_a_real_phone() {
     let recording = Recording::open(&out).unwrap();
     assert!(recording.metric && recording.up == DVec3::Y);
     let camera = recording.frames[0].camera;
-    assert!((camera.fx - 1404.302_978_515_625 * 192.0 / 1440.0).abs() < 1e-9 && camera.width == 192);
+    assert!((camera.fx - 1_404.302_978_515_625 * 192.0 / 1440.0).abs() < 1e-9 && camera.width == 192);
     // What one view measured, its neighbour measures, too: 1 cm in the median, where both see it.
     let mut off = Vec::new();
     for pair in [[0, 1], [5, 6], [10, 11]] {
@@ -310,4 +310,36 @@ fn polycam_raw_data() {
         let (recording, _) = imported(&src, &Config { min_confidence, ..Default::default() }).unwrap();
         assert_eq!([0, 1].map(|i| known_halves(&recording, i)[1]), expected);
     }
+}
+
+#[test]
+fn files_that_are_not_read_are_named_with_what_to_do() {
+    let (dir, src) = folder();
+    for (name, what, hint) in [
+        ("take.mkv", "Azure Kinect", "k4a_mkv2image"),
+        ("take.bag", "RealSense", "rs-convert -i"),
+        ("take.mcap", "ROS", "rtabmap-export"),
+        ("take.svo2", "ZED", "ZED_SVO_Export"),
+        ("scan.usdz", "finished model", "raw data"),
+    ] {
+        let file = src.join(name);
+        std::fs::write(&file, [0x1a, 0x45, 0xdf, 0xa3, 0xff, 0xfe]).unwrap();
+        for given in [&file, &src] {
+            let e = import(&[given], &dir.path().join("out"), &Config::default(), &Default::default()).unwrap_err();
+            assert!(e.what.contains(what) && e.hint.contains(hint) && e.place.ends_with(name), "{e}");
+            assert_eq!(e.to_string().lines().count(), 3);
+        }
+        std::fs::remove_file(&file).unwrap();
+    }
+    let file = dir.path().join("other.zip");
+    let mut zip = zip::ZipWriter::new(std::fs::File::create(&file).unwrap());
+    zip.start_file("readme.txt", zip::write::SimpleFileOptions::default()).unwrap();
+    zip.finish().unwrap();
+    let e = imported(&file, &Config::default()).unwrap_err();
+    assert!(e.what.contains("no recording") && e.hint.contains("Record3D"), "{e}");
+    // Two scans in a folder: each is a source.
+    std::fs::create_dir_all(src.join("a/keyframes/cameras")).unwrap();
+    std::fs::create_dir_all(src.join("b/keyframes/cameras")).unwrap();
+    let e = imported(&src, &Config::default()).unwrap_err();
+    assert!(e.what.contains("2 recordings") && e.hint.contains("/a ") && e.hint.contains("-o RECORDING"), "{e}");
 }

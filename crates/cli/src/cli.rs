@@ -62,8 +62,8 @@ pub enum Verb {
     /// Render a recording of an articulated object (URDF, MJCF, PartNet-Mobility) together with its
     /// truth.
     Synth(Synth),
-    /// Convert a recording of another layout (nerfstudio, ArtGS, DTA, PARIS, ScrewSplat, Dynamic 3D
-    /// Gaussians).
+    /// Convert scans of apps (Record3D, Polycam, Stray Scanner, 3D Scanner App) and recordings of other
+    /// layouts (COLMAP, BOP, TUM, nerfstudio, ArtGS, DTA, PARIS, ScrewSplat, Dynamic 3D Gaussians).
     Import(Import),
     /// Convert an object (PartNet-Mobility, URDF) for the simulator: convex collision pieces,
     /// joints, limits, masses.
@@ -161,13 +161,14 @@ pub struct SynthSettings {
 
 #[derive(Args, Debug)]
 pub struct Import {
-    /// Folder of the recording to convert. Several: one state each, in this order.
+    /// Folder of the recording to convert, or a .r3d or .zip. Several: one state each, in this order.
     #[arg(required = true, value_name = "SOURCE")]
     pub sources: Vec<PathBuf>,
     /// Recording folder to write.
     #[arg(long, short)]
     pub out: PathBuf,
-    /// Layout of the sources: auto, nerfstudio, artgs, dta, paris, screwsplat or dynamic3dgs.
+    /// Layout of the sources: auto, record3d, scanner3d, stray, polycam, colmap, bop, tum, nerfstudio,
+    /// artgs, dta, paris, screwsplat or dynamic3dgs.
     #[arg(long, default_value = "auto")]
     pub format: String,
     /// Pixels of less confidence lose their depth, where the source has confidence maps: 0 low, 1

@@ -7,8 +7,8 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 
-/// Puts a file in the place of each picture that is still in a film: those that thinning left, in one
-/// pass over each film.
+/// Puts a file in the place of each picture that is still in a film: those that thinning left, in
+/// one pass over each film.
 ///
 /// # Errors
 /// When there is no ffmpeg, or it does not give as many pictures as were asked for.
@@ -34,7 +34,8 @@ pub(super) fn take_out(shots: &mut [Shot], scratch: &mut Scratch) -> Result<(), 
 
 fn extract(film: &Path, pictures: &BTreeSet<usize>, folder: &Path) -> Result<(), CaptureError> {
     let select = pictures.iter().map(|i| format!("eq(n\\,{i})")).collect::<Vec<_>>().join("+");
-    // New times without gaps: else ffmpeg fills them with copies. Turned pictures would not fit the cameras.
+    // New times without gaps: else ffmpeg fills them with copies. Turned pictures would not fit the
+    // cameras.
     let filter = format!("select='{select}',setpts=N/FRAME_RATE/TB");
     let by_hand =
         format!("install ffmpeg, or take the pictures out yourself: {}", command(film, &film.with_file_name("rgb")));
@@ -65,7 +66,8 @@ fn extract(film: &Path, pictures: &BTreeSet<usize>, folder: &Path) -> Result<(),
     Ok(())
 }
 
-/// What takes all pictures out of a film, numbered from 0 (ffmpeg 5.1 and newer; before, `-vsync 0`).
+/// What takes all pictures out of a film, numbered from 0 (ffmpeg 5.1 and newer; before, `-vsync
+/// 0`).
 pub(super) fn command(film: &Path, folder: &Path) -> String {
     format!(
         "mkdir {0}; ffmpeg -noautorotate -i {1} -fps_mode passthrough -start_number 0 -qscale:v 2 {0}/%06d.jpg",

@@ -2,6 +2,7 @@
 
 use super::numbers::numbered;
 use super::subfolders;
+use super::{colmap, foreign};
 use crate::CaptureError;
 use serde::{Deserialize, Serialize};
 use std::path::{Path, PathBuf};
@@ -33,11 +34,17 @@ pub enum Format {
     Stray,
     /// Polycam's raw data: `keyframes/`.
     Polycam,
+    /// COLMAP's sparse model, text or binary, with `images/` and `depth/`.
+    Colmap,
+    /// A scene of BOP: `scene_camera.json`.
+    Bop,
+    /// TUM RGB-D: `rgb.txt`, `depth.txt`, `groundtruth.txt`.
+    Tum,
 }
 
 impl Format {
     /// Every format with its name on the command line.
-    pub const ALL: [(&'static str, Format); 11] = [
+    pub const ALL: [(&'static str, Format); 14] = [
         ("auto", Format::Auto),
         ("nerfstudio", Format::Nerfstudio),
         ("artgs", Format::Artgs),
@@ -49,6 +56,9 @@ impl Format {
         ("scanner3d", Format::Scanner3d),
         ("stray", Format::Stray),
         ("polycam", Format::Polycam),
+        ("colmap", Format::Colmap),
+        ("bop", Format::Bop),
+        ("tum", Format::Tum),
     ];
 
     /// Its name on the command line.
@@ -87,6 +97,9 @@ pub fn detect(src: &Path) -> Result<Format, CaptureError> {
                 ),
             );
         }
+        if let Some(error) = foreign::inside(src) {
+            return error;
+        }
         let names: Vec<&str> = Format::ALL[1..].iter().map(|(name, _)| *name).collect();
         CaptureError::new(
             "the layout is not recognised",
@@ -118,8 +131,14 @@ pub(super) fn known(src: &Path) -> Option<Format> {
         Some(Format::Stray)
     } else if has("keyframes/corrected_cameras") || has("keyframes/cameras") || has("corrected_cameras") {
         Some(Format::Polycam)
+    } else if has("scene_camera.json") {
+        Some(Format::Bop)
+    } else if has("groundtruth.txt") && (has("rgb.txt") || has("associations.txt")) {
+        Some(Format::Tum)
     } else if has("transforms.json") || any_sub("transforms.json") || src.is_file() {
         Some(Format::Nerfstudio)
+    } else if colmap::model_folder(src).is_some() {
+        Some(Format::Colmap)
     } else {
         None
     }

@@ -1,13 +1,16 @@
 //! Other layouts of the field into native recordings.
 //!
 //! Each layout's file lists its pictures as `Shot`s; `store` decodes, brings colour and mask to the
-//! size of the depth, undistorts and writes them. World frame and scale stay the source's; `join` puts
-//! several sources together, a state each.
+//! size of the depth, undistorts and writes them. World frame and scale stay the source's; `join`
+//! puts several sources together, a state each.
 
 mod artgs;
+mod bop;
+mod colmap;
 mod dta;
 mod dynamic3dgs;
 mod film;
+mod foreign;
 mod format;
 mod grid;
 mod join;
@@ -23,6 +26,7 @@ mod screwsplat;
 mod store;
 mod stray;
 mod thin;
+mod tum;
 mod unpack;
 
 pub use format::{Format, detect};
@@ -51,8 +55,8 @@ pub struct Config {
 }
 
 impl Default for Config {
-    /// ARKit's low confidence is depth it made up at edges. 120 views show a thing from all sides; a
-    /// film has thousands, which cost time and add no side.
+    /// ARKit's low confidence is depth it made up at edges. 120 views show a thing from all sides;
+    /// a film has thousands, which cost time and add no side.
     fn default() -> Self {
         Self { format: Format::Auto, min_confidence: 1, every: 1, max_views: 120 }
     }
@@ -154,6 +158,8 @@ pub(crate) enum MaskFrom {
     /// The colour image's alpha, if it has one.
     Alpha,
     File(PathBuf),
+    /// Whatever one of several files shows: a file for each thing.
+    Any(Vec<PathBuf>),
 }
 
 /// Converts sources into a native recording at `out`. One source may have several states; several
@@ -169,35 +175,41 @@ pub fn import<P: AsRef<Path>>(
     progress: &Progress,
 ) -> Result<ImportReport, CaptureError> {
     crate::synth::may_be_replaced(out)?;
-    let several = sources.len() > 1;
     let mut scratch = Scratch::new(out);
+    // Sources and where they are read: zip files are unpacked.
+    let mut found = Vec::new();
+    convert(sources, out, config, progress, &mut scratch, &mut found).map_err(|mut e| {
+        for (at, src) in found.iter().filter(|(at, src)| at != src) {
+            e.place = e.place.replace(&at.display().to_string(), &src.display().to_string());
+        }
+        e
+    })
+}
+
+fn convert<P: AsRef<Path>>(
+    sources: &[P],
+    out: &Path,
+    config: &Config,
+    progress: &Progress,
+    scratch: &mut Scratch,
+    found: &mut Vec<(PathBuf, PathBuf)>,
+) -> Result<ImportReport, CaptureError> {
+    let several = sources.len() > 1;
     let mut formats = Vec::new();
     let mut parts = Vec::new();
     for src in sources.iter().map(P::as_ref) {
         progress.check()?;
-        let found = find(src, &mut scratch)?;
-        let read_it = || {
-            let format = if config.format == Format::Auto { detect(&found)? } else { config.format };
-            Ok((format, read(&found, format, several)?))
-        };
-        // Errors speak of the zip file, not of where it was unpacked.
-        let name_zip = |mut e: CaptureError| {
-            if found != src {
-                e.place = e.place.replace(&found.display().to_string(), &src.display().to_string());
-            }
-            e
-        };
-        let (format, mut source) = read_it().map_err(name_zip)?;
+        let at = find(src, scratch)?;
+        found.push((at.clone(), src.to_path_buf()));
+        let format = if config.format == Format::Auto { detect(&at)? } else { config.format };
+        let mut source = read(&at, format, several)?;
         if !source.shots.iter().any(|s| s.split == Split::Train) {
+            let what = format!("no training pictures were found for the layout {}", format.name());
             let hint = "check that the folder is complete, or name another --format";
-            return Err(CaptureError::new(
-                format!("no training pictures were found for the layout {}", format.name()),
-                src.display().to_string(),
-                hint,
-            ));
+            return Err(CaptureError::new(what, src.display().to_string(), hint));
         }
         thin::thin(&mut source, config);
-        film::take_out(&mut source.shots, &mut scratch)?;
+        film::take_out(&mut source.shots, scratch)?;
         formats.push(format);
         parts.push((src.to_path_buf(), source));
     }
@@ -214,18 +226,22 @@ pub fn import<P: AsRef<Path>>(
     })
 }
 
-/// The folder (or file) to read: zip files are unpacked, and what holds nothing but one folder is that
-/// folder.
+/// The folder (or file) to read: zip files are unpacked, and what holds nothing but one folder is
+/// that folder.
 fn find(src: &Path, scratch: &mut Scratch) -> Result<PathBuf, CaptureError> {
     let mut found = src.to_path_buf();
     if src.is_file() && unpack::is_zip(src) {
         found = scratch.folder()?;
         unpack::unpack(src, &found)?;
+    } else if src.is_file() {
+        return foreign::refuse(src).map_or(Ok(found), Err);
     }
     while found.is_dir() && format::known(&found).is_none() {
         match &subfolders(&found)[..] {
             [only] => found = only.clone(),
-            _ => return Ok(if found.starts_with(src) { src.to_path_buf() } else { found }),
+            _ if src.is_file() => return Err(foreign::zip_of_something_else(src)),
+            // Not known: say so about what was given.
+            _ => return Ok(src.to_path_buf()),
         }
     }
     Ok(found)
@@ -244,6 +260,9 @@ fn read(src: &Path, format: Format, several: bool) -> Result<Source, CaptureErro
         Format::Scanner3d => scanner3d::read(src)?,
         Format::Stray => stray::read(src)?,
         Format::Polycam => polycam::read(src)?,
+        Format::Colmap => colmap::read(src)?,
+        Format::Bop => bop::read(src)?,
+        Format::Tum => tum::read(src)?,
     })
 }
 

@@ -59,9 +59,30 @@ pub(super) fn read(src: &Path, one_state: bool) -> Result<Source, CaptureError> 
             });
         }
     }
-    let metric = documents.iter().any(|d| d.metric);
-    let registered = documents.iter().all(|d| d.registered);
-    Ok(Source { shots, metric, up: documents.first().map_or(DVec3::Z, |d| d.up), registered, notes: Vec::new() })
+    let mut source = Source {
+        shots,
+        metric: documents.iter().any(|d| d.metric),
+        up: documents.first().map_or(DVec3::Z, |d| d.up),
+        registered: documents.iter().all(|d| d.registered),
+        notes: Vec::new(),
+    };
+    if documents.iter().all(is_nerf_capture) {
+        (source.metric, source.up) = (true, DVec3::Y);
+        source.notes.push("depth_path with names without ending is NeRFCapture's: metres and y up are taken".into());
+    }
+    Ok(source)
+}
+
+/// NeRFCapture (a phone's app) writes instant-ngp's keys and leaves the endings of pictures away.
+/// Its world is ARKit's: metres, y up.
+fn is_nerf_capture(d: &Document) -> bool {
+    let has = |key: &str| d.value.get(key).is_some();
+    let without_ending = |f: &serde_json::Value| {
+        let name = f["file_path"].as_str().unwrap_or(".");
+        f.get("depth_path").is_some() && Path::new(name).extension().is_none()
+    };
+    let frames = d.value["frames"].as_array();
+    !has("up") && !has("metric") && frames.is_some_and(|f| !f.is_empty() && f.iter().all(without_ending))
 }
 
 /// States in the order of time, when there are few times. Keys are bit patterns: times >= 0 sort

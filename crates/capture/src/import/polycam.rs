@@ -1,7 +1,8 @@
-//! Polycam (iPhone, iPad), export "raw data" (developer mode): `keyframes/corrected_cameras/<t>.json`
-//! (fx fy cx cy width height, t_00 .. t_23: three rows of camera-to-world, OpenGL axes, y up, metres),
-//! `corrected_images/<t>.jpg`, `depth/<t>.png` (16 bits, millimetres, smaller), `confidence/<t>.png` (0, 127,
-//! 255). Sessions that were too large to be optimised have only `cameras` and `images`: ARKit's own poses.
+//! Polycam (iPhone, iPad), export "raw data" (developer mode):
+//! `keyframes/corrected_cameras/<t>.json` (fx fy cx cy width height, t_00 .. t_23: three rows of
+//! camera-to-world, OpenGL axes, y up, metres), `corrected_images/<t>.jpg`, `depth/<t>.png` (16
+//! bits, millimetres, smaller), `confidence/<t>.png` (0, 127, 255). Sessions that were too large to
+//! be optimised have only `cameras` and `images`: ARKit's own poses.
 
 use super::grid::Grid;
 use super::numbers::{files, json, pose_from_gl, wrong};

@@ -1,9 +1,11 @@
-//! Record3D (iPhone, iPad), two exports of one recording: "EXR + RGBD" (`metadata.json`, `rgb/N.jpg`,
-//! `depth/N.exr`, one channel of half floats) and `.r3d` (a zip with `metadata`, `rgbd/N.jpg`, `N.depth`,
-//! `N.conf`, both LZFSE). Depth is in metres; N counts the poses and may have gaps.
+//! Record3D (iPhone, iPad), two exports of one recording: "EXR + RGBD" (`metadata.json`,
+//! `rgb/N.jpg`, `depth/N.exr`, one channel of half floats) and `.r3d` (a zip with `metadata`,
+//! `rgbd/N.jpg`, `N.depth`, `N.conf`, both LZFSE). Depth is in metres; N counts the poses and may
+//! have gaps.
 //!
-//! `K`: nine numbers column by column for w x h; `perFrameIntrinsicCoeffs[N]`: fx fy cx cy, where there
-//! is autofocus. `poses[N]`: qx qy qz qw tx ty tz, camera-to-world, OpenGL axes, y up (ARKit).
+//! `K`: nine numbers column by column for w x h; `perFrameIntrinsicCoeffs[N]`: fx fy cx cy, where
+//! there is autofocus. `poses[N]`: qx qy qz qw tx ty tz, camera-to-world, OpenGL axes, y up
+//! (ARKit).
 
 use super::grid::Grid;
 use super::numbers::{image_size, json, numbered, quaternion_pose_from_gl, wrong};

@@ -1,14 +1,15 @@
 //! Pictures to another size: colours as averages of area, masks by majority, depth untouched.
 //!
-//! Pixel centres lie at +0.5, so pixel `i` of `n` covers `[i, i + 1) / n` of the picture, and a camera
-//! that is scaled with the picture (`Camera::resized`) is exact.
+//! Pixel centres lie at +0.5, so pixel `i` of `n` covers `[i, i + 1) / n` of the picture, and a
+//! camera that is scaled with the picture (`Camera::resized`) is exact.
 
 /// Rows and columns.
 pub(super) type Size = (usize, usize);
 
 /// Whether two sizes show one picture: sides in one proportion, up to rounding.
 pub(super) fn same_shape(a: Size, b: Size) -> bool {
-    /// Apps round the sides: 0.02 of the picture, 4 pixels of a depth map, is no other field of view.
+    /// Apps round the sides: 0.02 of the picture, 4 pixels of a depth map, is no other field of
+    /// view.
     const TOLERANCE: f64 = 0.02;
     let (x, y) = (a.0 as f64 / b.0 as f64, a.1 as f64 / b.1 as f64);
     (x / y - 1.0).abs() < TOLERANCE

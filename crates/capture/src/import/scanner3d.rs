@@ -1,7 +1,7 @@
-//! 3D Scanner App (iPhone, iPad), export "All Data": per frame N `frame_N.json` (`intrinsics`, nine numbers
-//! row by row, of the jpg; `cameraPoseARFrame`, sixteen numbers row by row, camera-to-world, OpenGL axes,
-//! y up, metres; `time`), `depth_N.png` (16 bits, millimetres) and `conf_N.png` (0, 1, 2). Only every third
-//! or so has a picture, `frame_N.jpg`.
+//! 3D Scanner App (iPhone, iPad), export "All Data": per frame N `frame_N.json` (`intrinsics`, nine
+//! numbers row by row, of the jpg; `cameraPoseARFrame`, sixteen numbers row by row,
+//! camera-to-world, OpenGL axes, y up, metres; `time`), `depth_N.png` (16 bits, millimetres) and
+//! `conf_N.png` (0, 1, 2). Only every third or so has a picture, `frame_N.jpg`.
 //!
 //! Other keys and files of the export hold where the scan was made (GPS): none of them is read.
 

@@ -1,8 +1,8 @@
-//! Decodes the pictures of a source, brings them to one size, undistorts them, and writes the native
-//! recording.
+//! Decodes the pictures of a source, brings them to one size, undistorts them, and writes the
+//! native recording.
 //!
-//! Depth is never enlarged: where it is smaller than the colour (every phone), colour, mask and camera
-//! are brought to its size. Where it is larger, it is brought to the colour's.
+//! Depth is never enlarged: where it is smaller than the colour (every phone), colour, mask and
+//! camera are brought to its size. Where it is larger, it is brought to the colour's.
 
 use super::resize::{Size, area_average, majority, nearest, nearest_known, same_shape};
 use super::{MaskFrom, Shot, Source};
@@ -13,7 +13,7 @@ use glam::DVec2;
 use hingecast_geom::{Camera, Progress};
 use rayon::prelude::*;
 use std::collections::BTreeMap;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicUsize, Ordering};
 
 /// The recording, and what to tell about its pictures.
@@ -140,6 +140,7 @@ fn one(shot: &Shot, view: usize, root: &Path, min_confidence: u8) -> Result<(Fra
     let alpha = || rgba.chunks_exact(4).map(|p| if p[3] > 127 { 255 } else { 0 }).collect::<Vec<u8>>();
     let mask = match &shot.mask {
         MaskFrom::File(path) => Some(mask_file(path, to)?),
+        MaskFrom::Any(paths) => Some(any_mask(paths, to)?),
         MaskFrom::Alpha if has_alpha => Some(majority(&alpha(), size, to)),
         MaskFrom::Alpha => None,
     };
@@ -203,7 +204,8 @@ struct Picture {
     hidden: Option<Vec<u8>>,
 }
 
-/// 0 or 255 at the size wanted: by majority where it is larger, by the nearest pixel where it is smaller.
+/// 0 or 255 at the size wanted: by majority where it is larger, by the nearest pixel where it is
+/// smaller.
 fn mask_file(path: &Path, to: Size) -> Result<Vec<u8>, CaptureError> {
     let (mask, w, h) = mask::read(path)?;
     let from = (w, h);
@@ -211,6 +213,15 @@ fn mask_file(path: &Path, to: Size) -> Result<Vec<u8>, CaptureError> {
         return Ok(majority(&mask, from, to));
     }
     Ok(nearest(from, to).map(|i| 255 * mask[i]).collect())
+}
+
+/// 255 where one of the files says so.
+fn any_mask(paths: &[PathBuf], to: Size) -> Result<Vec<u8>, CaptureError> {
+    let mut all = vec![0; to.0 * to.1];
+    for path in paths {
+        all.iter_mut().zip(mask_file(path, to)?).for_each(|(a, m)| *a |= m);
+    }
+    Ok(all)
 }
 
 /// Depth in scene units at its own size, 0 where it is unknown or not sure enough.

@@ -1,10 +1,11 @@
-//! Stray Scanner (iPhone, iPad): `rgb.mp4`, `depth/%06d.png` (16 bits, millimetres; `.npy` in old versions),
-//! `confidence/%06d.png` (0, 1, 2), `odometry.csv`, `camera_matrix.csv`.
+//! Stray Scanner (iPhone, iPad): `rgb.mp4`, `depth/%06d.png` (16 bits, millimetres; `.npy` in old
+//! versions), `confidence/%06d.png` (0, 1, 2), `odometry.csv`, `camera_matrix.csv`.
 //!
-//! Row i of odometry.csv belongs to picture i of the film, whatever its time says. Its columns: timestamp,
-//! frame, x y z, qx qy qz qw (camera-to-world, OpenCV axes, y up, metres) and, since 2026, fx fy cx cy of the
-//! film's pixels; two more may be empty. camera_matrix.csv is that of the last frame. Pictures that somebody
-//! took out of the film already (`rgb/` or `images/`) are taken instead of it.
+//! Row i of odometry.csv belongs to picture i of the film, whatever its time says. Its columns:
+//! timestamp, frame, x y z, qx qy qz qw (camera-to-world, OpenCV axes, y up, metres) and, in new
+//! versions, fx fy cx cy of the film's pixels; two more may be empty. camera_matrix.csv is that of
+//! the last frame. Pictures that somebody took out of the film already (`rgb/` or `images/`) are
+//! taken instead of it.
 
 use super::grid::Grid;
 use super::numbers::{numbered, rigid, rows, wrong};

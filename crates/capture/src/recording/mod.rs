@@ -80,8 +80,8 @@ pub struct Recording {
     pub metric: bool,
     /// Unit vector that points up in the world.
     pub up: DVec3,
-    /// All states share one world frame. False: each state's poses are in a world of their own (scans
-    /// that were put together), and nobody has brought them together yet.
+    /// All states share one world frame. False: each state's poses are in a world of their own
+    /// (scans that were put together), and nobody has brought them together yet.
     pub registered: bool,
 }
 

@@ -201,14 +201,7 @@ fn entry(
     let file_path = f.text("file_path")?.ok_or_else(|| f.missing("file_path", "the colour image"))?;
     let color = resolve(folder, file_path);
     let rows = f.matrix("transform_matrix")?.ok_or_else(|| f.missing("transform_matrix", "camera-to-world, 4x4"))?;
-    let depth_scale = f.number("depth_unit_scale_factor")?.unwrap_or(1e-3);
-    if depth_scale <= 0.0 {
-        return Err(f.wrong(
-            "depth_unit_scale_factor",
-            &f.get("depth_unit_scale_factor").cloned().unwrap_or_default(),
-            "a number above 0 (0.001 for millimetres)",
-        ));
-    }
+    let (depth, depth_scale) = depth(f, folder)?;
     let state = match (f.count("state")?, folder_state) {
         (Some(state), _) => state,
         (None, DefaultState::Is(state)) => state,
@@ -225,7 +218,7 @@ fn entry(
         state,
         view: f.count("view")?,
         split,
-        depth: path("depth_file_path")?,
+        depth,
         depth_scale,
         mask: path("mask_path")?,
         occluded: f.flag("occluded")?.unwrap_or(false),
@@ -233,6 +226,29 @@ fn entry(
         time: f.number("time")?,
         color,
     })
+}
+
+/// The depth file and the scene units of its unit: nerfstudio's keys, or those of instant-ngp and
+/// NeRFCapture.
+fn depth(f: &Fields, folder: &Path) -> Result<(Option<PathBuf>, f64), CaptureError> {
+    let nerfstudio = f.text("depth_file_path")?;
+    let scales: &[&str] = match nerfstudio {
+        Some(_) => &["depth_unit_scale_factor"],
+        None => &["integer_depth_scale", "depth_integer_scale", "depth_unit_scale_factor"],
+    };
+    let Some(path) = nerfstudio.or(f.text("depth_path")?) else { return Ok((None, 1e-3)) };
+    let key = scales.iter().find(|key| f.get(key).is_some());
+    let Some(key) = key else {
+        // nerfstudio has a default, instant-ngp has none.
+        let none = f.missing("integer_depth_scale", "metres per unit of the files of depth_path");
+        return if nerfstudio.is_some() { Ok((Some(resolve(folder, path)), 1e-3)) } else { Err(none) };
+    };
+    let scale = f.number(key)?.unwrap_or(0.0);
+    if scale <= 0.0 {
+        let value = f.get(key).cloned().unwrap_or_default();
+        return Err(f.wrong(key, &value, "a number above 0 (0.001 for millimetres)"));
+    }
+    Ok((Some(resolve(folder, path)), scale))
 }
 
 /// nerfstudio's keys; also `camera_angle_x` of the older NeRF layout. Without w and h the image
@@ -279,14 +295,19 @@ fn intrinsics(f: &Fields, color: &Path) -> Result<Intrinsics, CaptureError> {
     Ok(Intrinsics { width, height, fx, fy, cx, cy, distortion, fisheye })
 }
 
-/// Absolute path; the older NeRF layout leaves ".png" away.
+/// Absolute path; the older NeRF layout leaves ".png" away, NeRFCapture either ending.
 fn resolve(folder: &Path, name: &str) -> PathBuf {
     let mut path = folder.join(name.strip_prefix("./").unwrap_or(name));
     // Written on Windows, unless a file is really called so.
     if name.contains('\\') && !path.exists() {
         path = folder.join(normal_name(&name.replace('\\', "/")));
     }
-    if path.extension().is_none() { path.with_extension("png") } else { path }
+    if path.extension().is_some() {
+        return path;
+    }
+    let endings = ["png", "jpg", "jpeg"].map(|ending| path.with_extension(ending));
+    let there = endings.iter().find(|p| p.is_file()).unwrap_or(&endings[0]);
+    there.clone()
 }
 
 /// File names compare without "./" and with forward slashes.
