@@ -70,6 +70,9 @@ pub enum Verb {
     ImportObject(ImportObject),
     /// Say what is wrong with a recording and what to try; `--fix` repairs what is safe to repair.
     Check(Check),
+    /// Find the object in a recording without masks - what moves, and what that hangs on - and write
+    /// its masks into the recording, with a sheet of pictures to look at.
+    Mask(Mask),
     /// Build the twin of a recording. Run again to resume; finished stages are kept.
     Build(Build),
     /// Compare a run with the truth of its recording.
@@ -207,6 +210,15 @@ pub struct Check {
     /// Repair what is safe: the old transforms.json is kept beside the new one.
     #[arg(long)]
     pub fix: bool,
+}
+
+#[derive(Args, Debug)]
+pub struct Mask {
+    /// Recording folder (the one that holds transforms.json).
+    pub recording: PathBuf,
+    /// Seed of the samples that are looked at.
+    #[arg(long, default_value_t = 0, value_name = "N")]
+    pub seed: u64,
 }
 
 #[derive(Args, Debug)]

@@ -122,7 +122,7 @@ fn build_with(
     threads: usize,
     watcher: &dyn Watcher,
 ) -> Result<RunFolder> {
-    let recording = Recording::open(recording)?;
+    let mut recording = Recording::open(recording)?;
     refuse_hopeless(&recording, config.method)?;
     RunFolder::may_become_run(run)?;
     std::fs::create_dir_all(run).map_err(Failure::io(run))?;
@@ -141,19 +141,20 @@ fn build_with(
     let path = run.join("config.toml");
     hingecast_geom::staging::write_whole(&path, text.as_bytes()).map_err(Failure::io(&path))?;
 
+    let prepared = crate::prepare::for_build(&mut recording, &mut folder, config.seed, watcher)?;
     let cache = ViewCache::new(&recording, config.memory_mb << 20);
     let background = targets::background(&recording, &cache)?;
     let mut inputs =
         Inputs { recording: &recording, cache: &cache, config, threads, background, cameras: BTreeMap::new() };
     let mut made = Made::new(run.to_path_buf());
     let all = Stage::all(config.method);
-    let stamps = stamps(config, &folder.record.fingerprint);
+    let stamps = stamps(config, &format!("{}{prepared}", folder.record.fingerprint));
     let place = |stage: Stage| all.iter().position(|s| *s == stage).unwrap_or(all.len());
     let from = options.from.map_or(all.len(), place);
     let to = options.to.map_or(all.len() - 1, place);
     if !folder.is_done(all[0].name(), &stamps[0]) {
         // Another method's stages would stand in the way.
-        folder.record.stages.clear();
+        folder.record.stages.retain(|s| s.name == crate::prepare::STAGE);
     }
     for (i, stage) in all.iter().enumerate().take(to + 1) {
         let name = stage.name();

@@ -26,6 +26,7 @@
 //! | [`config`], [`overrides`] | settings; a person's corrections of joints |
 //! | [`eval`] | a run against the truth: the only code that opens a truth folder |
 //! | [`objects`] | objects of others, as their own simulators understand them |
+//! | [`prepare`] | states registered, the object found, where the recording lacks it |
 //! | [`report`] | the page of a run |
 //!
 //! Parts and joints are found by `hingecast_articulate::find`, which can be called on depth images
@@ -45,6 +46,7 @@ pub mod import_object;
 pub mod memory;
 pub mod objects;
 pub mod overrides;
+pub mod prepare;
 pub mod report;
 pub mod run_files;
 pub mod stage;

@@ -80,11 +80,13 @@ fn is_stages(stage: &str, path: &Path) -> bool {
         "joints" => &["joints.json"],
         "twin" => &["simulator.json"],
         "report" => &["index.html"],
+        "prepare" => &["prepare.json", "masks.png"],
         _ => &[],
     };
     let more = match stage {
         "motion" => numbered("state_", ".ply"),
         "twin" => hingecast_twin::is_ours(path),
+        "prepare" => crate::prepare::is_mask(name),
         "report" => numbered("state_", ".png") || numbered("held_out_", ".png"),
         _ => false,
     };
@@ -100,7 +102,7 @@ pub fn may_empty_stage(root: &Path, stage: &str) -> Result<()> {
 }
 
 /// The folders that hingecast makes in a run.
-pub const FOLDERS: [&str; 6] = ["parts", "splat", "motion", "joints", "twin", "report"];
+pub const FOLDERS: [&str; 7] = ["prepare", "parts", "splat", "motion", "joints", "twin", "report"];
 /// The files, besides `run.json` and the lock.
 pub const FILES: [&str; 2] = ["config.toml", "eval.json"];
 

@@ -41,6 +41,15 @@ pub enum PrepareError {
         /// Farthest that a point of the scan moves from one to the other, scene units.
         distance: f64,
     },
+    /// No surface of a state lies where another saw empty space.
+    #[error("nothing moves between the states: {samples} samples of surface were looked through by another state")]
+    NothingMoved {
+        /// Samples that moved.
+        samples: usize,
+    },
+    /// The cameras look at nothing in common.
+    #[error("the cameras look at nothing in common that has depth")]
+    NoFocus,
     /// The person asked to stop.
     #[error(transparent)]
     Cancelled(#[from] Cancelled),

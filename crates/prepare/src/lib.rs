@@ -3,6 +3,7 @@
 //!
 //! ```text
 //! register    the states' frames, brought together on what stands still: pairs of scans globally, all together finely
+//! mask        the object without masks: what moves, and what that hangs on
 //! ```
 //!
 //! World frame, scene units and radians; `a_from_b` maps points of frame b into frame a; cameras are
@@ -11,9 +12,11 @@
 #![warn(missing_docs)]
 
 mod error;
+pub mod mask;
 pub mod register;
 mod scan;
 
 pub use error::PrepareError;
+pub use mask::{MaskReport, Masks, object_masks};
 pub use register::{Registration, register};
 pub use scan::Scan;

@@ -124,7 +124,7 @@ pub fn fix(path: &Path, report: &CheckReport) -> Result<Vec<String>, CaptureErro
 
 /// A copy beside the file: `.bak`, or `.bak2` and so on where a file of that name is another's or
 /// another time's. None is written over.
-fn backup(file: &Path) -> Result<(), CaptureError> {
+pub(crate) fn backup(file: &Path) -> Result<(), CaptureError> {
     let text = std::fs::read(file).map_err(|e| CaptureError::read(file, e))?;
     let kept = free(
         &text,

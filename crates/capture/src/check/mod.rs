@@ -10,6 +10,7 @@ mod motion;
 mod pixels;
 mod space;
 
+pub(crate) use fix::backup;
 pub use fix::{Fix, fix};
 
 use crate::recording::transforms;

@@ -12,6 +12,7 @@ mod fields;
 mod fingerprint;
 pub mod images;
 pub(crate) mod mask;
+pub mod masked;
 mod packed_depth;
 mod stray;
 pub(crate) mod transforms;

@@ -123,7 +123,7 @@ pub fn synth(
         n_states: config.states,
         metric: object.metric,
         up: DVec3::Z,
-        registered: true,
+        registered: config.world.frames == Frames::Shared,
     };
     recording.write()?;
     if let Some(truth) = truth_work {

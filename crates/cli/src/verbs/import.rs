@@ -3,6 +3,8 @@
 use super::{Outcome, Session};
 use crate::cli::Import;
 use hingecast::failure::Result;
+use hingecast::prepare;
+use hingecast_capture::Recording;
 use hingecast_capture::import::{Config, Format, import};
 
 pub fn run(session: &Session, args: &Import) -> Result<Outcome> {
@@ -20,6 +22,17 @@ pub fn run(session: &Session, args: &Import) -> Result<Outcome> {
         report.states,
         report.recording.display()
     ));
+    let mut recording = Recording::open(&report.recording)?;
+    let mut registration = None;
+    if !recording.registered && recording.n_states > 1 {
+        let found = prepare::register(&mut recording, 0, &session.ui.stage("register"))?;
+        recording.write()?;
+        session.ui.say(&prepare::sentence(&found));
+        registration = Some(found);
+    }
+    if prepare::Needs::of(&recording)?.masks {
+        session.ui.say("no masks: build will look for the object; `hingecast mask` does it now and shows it");
+    }
     session.ui.say(&format!("next: hingecast check {}", report.recording.display()));
     session.answer(&serde_json::json!({
         "recording": report.recording,
@@ -27,6 +40,7 @@ pub fn run(session: &Session, args: &Import) -> Result<Outcome> {
         "states": report.states,
         "frames": report.frames,
         "notes": report.notes,
+        "registration": registration,
     }))?;
     Ok(Outcome::Done)
 }

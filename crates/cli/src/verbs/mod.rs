@@ -12,6 +12,7 @@ mod eval;
 mod experiment;
 mod import;
 mod import_object;
+mod mask;
 #[cfg(feature = "mujoco")]
 mod rollout;
 mod synth;
@@ -66,6 +67,7 @@ pub fn run(cli: &Cli) -> Result<Outcome> {
         Verb::Synth(args) => synth::run(&session, args),
         Verb::Import(args) => import::run(&session, args),
         Verb::ImportObject(args) => import_object::run(&session, args),
+        Verb::Mask(args) => mask::run(&session, args),
         Verb::Check(args) => check::run(&session, args),
         Verb::Build(args) => build::run(&session, args),
         Verb::Eval(args) => eval::run(&session, args),

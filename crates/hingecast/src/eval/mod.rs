@@ -116,7 +116,7 @@ pub fn evaluate(run: &Path, truth: &Path, progress: &Progress) -> Result<Evaluat
 
 /// The run's recording, if the truth is of it.
 fn recording_of(folder: &RunFolder, truth: &Truth) -> Result<Recording> {
-    let recording = Recording::open(&folder.record.recording)?;
+    let recording = crate::prepare::recording_of(folder)?;
     if recording.n_states != truth.n_states {
         return Err(Failure::new(
             format!("the recording has {} states, the truth {}", recording.n_states, truth.n_states),

@@ -42,7 +42,7 @@ pub fn write(run: &RunFolder) -> Result<PathBuf> {
     let folder = run.folder("report");
     std::fs::create_dir_all(&folder).map_err(Failure::io(&folder))?;
     let twin = TwinFile::read(&run.root)?;
-    let recording = Recording::open(&run.record.recording)?;
+    let recording = crate::prepare::recording_of(run)?;
     let Splats { gaussians, extent, .. } = Splats::read(&run.root)?;
     let found = Joints::read(&run.root)?;
     found.fit(&run.root, recording.n_states, gaussians.len())?;

@@ -1,0 +1,241 @@
+//! Before parts are sought: states that have a world each are registered, and where there are no
+//! masks the object is found.
+//!
+//! `import` and `hingecast mask` write what was found into the recording; `build` keeps it in the
+//! run's folder `prepare/` and leaves the recording alone.
+
+mod raw_depths;
+mod sheet;
+
+use crate::failure::{Failure, Result};
+use crate::stage::{RunFolder, stamp, write_json};
+use crate::watcher::Watcher;
+use hingecast_capture::recording::images;
+use hingecast_capture::{Recording, Split};
+use hingecast_geom::{Pose, Progress};
+use hingecast_prepare::register::Freedom;
+use hingecast_prepare::{MaskReport, PrepareError, Registration, object_masks};
+use raw_depths::RawDepths;
+use serde::{Deserialize, Serialize};
+use std::path::{Path, PathBuf};
+use std::time::Instant;
+
+pub use sheet::contact_sheet;
+
+/// The name of the step, and of its folder in a run.
+pub const STAGE: &str = "prepare";
+/// With at least this share of the pixels known, pictures without masks show a room.
+const FILLED: f64 = 0.6;
+
+/// `prepare/prepare.json`.
+#[derive(Clone, Debug, Default, Serialize, Deserialize)]
+pub struct Prepared {
+    /// How the states' worlds lie to each other, where each had its own.
+    pub registration: Option<Registration>,
+    /// How the object was found, where there were no masks. Its masks lie beside.
+    pub masks: Option<MaskReport>,
+}
+
+/// What a recording lacks.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Needs {
+    /// Its states have a world each.
+    pub registration: bool,
+    /// It has no masks, and shows a room.
+    pub masks: bool,
+}
+
+impl Needs {
+    /// What `recording` lacks.
+    ///
+    /// # Errors
+    /// When its first picture cannot be read.
+    pub fn of(recording: &Recording) -> Result<Self> {
+        let masked = recording.frames.iter().any(|f| f.mask.is_some());
+        let first = recording.frames_of(0, Split::Train);
+        let masks = !masked && !first.is_empty() && {
+            let view = recording.load(first[0])?;
+            let known = view.depth.iter().filter(|z| **z > 0.0).count() as f64;
+            view.mask.iter().all(|m| *m == 1) && known >= FILLED * view.depth.len() as f64
+        };
+        Ok(Self { registration: !recording.registered, masks })
+    }
+}
+
+/// Brings the states' worlds together: cameras of every state in the frame of state 0.
+///
+/// # Errors
+/// Scans that have too little in common, or fit in two ways; a picture that cannot be read; the
+/// wish to stop.
+pub fn register(recording: &mut Recording, seed: u64, progress: &Progress) -> Result<Registration> {
+    let mut depths = RawDepths::new(recording);
+    let up = Freedom::AboutUp(recording.up);
+    let found = match hingecast_prepare::register(&mut depths, up, seed, progress) {
+        // Up may not be what the file says.
+        Err(PrepareError::Apart { .. }) => hingecast_prepare::register(&mut depths, Freedom::Any, seed, progress),
+        other => other,
+    };
+    let found = found.map_err(|e| failure(e, recording))?;
+    apply(recording, &found.common_from_state);
+    Ok(found)
+}
+
+fn apply(recording: &mut Recording, common_from_state: &[Pose]) {
+    for frame in &mut recording.frames {
+        if let Some(common_from_own) = common_from_state.get(frame.state) {
+            frame.camera.camera_from_world = frame.camera.camera_from_world * common_from_own.inverse();
+        }
+    }
+    recording.registered = true;
+}
+
+/// Finds the object and writes its masks into `folder`, one PNG a training frame, named as the
+/// colour image is; frames point there.
+///
+/// # Errors
+/// Nothing that moves, a picture that cannot be read or written, the wish to stop.
+pub fn find_masks(recording: &mut Recording, folder: &Path, seed: u64, progress: &Progress) -> Result<MaskReport> {
+    let mut depths = RawDepths::new(recording);
+    let found = object_masks(&mut depths, recording.up, seed, progress).map_err(|e| failure(e, recording))?;
+    for (state, masks) in found.masks.iter().enumerate() {
+        for (frame, mask) in recording.frames_of(state, Split::Train).into_iter().zip(masks) {
+            let path = folder.join(mask_name(recording, frame));
+            let camera = &recording.frames[frame].camera;
+            let bytes: Vec<u8> = mask.iter().map(|m| 255 * m).collect();
+            images::write_gray(&path, &bytes, camera.width, camera.height)?;
+            recording.frames[frame].mask = Some(path);
+        }
+    }
+    Ok(found.report)
+}
+
+/// `s003_v012.png`, which no two frames share.
+fn mask_name(recording: &Recording, frame: usize) -> String {
+    let f = &recording.frames[frame];
+    let before = recording.frames[..frame].iter().filter(|o| (o.state, o.view) == (f.state, f.view)).count();
+    let more = if before > 0 { format!("_{before}") } else { String::new() };
+    format!("s{:03}_v{:03}{more}.png", f.state, f.view)
+}
+
+/// Whether `name` is one of those that [`find_masks`] gives.
+pub fn is_mask(name: &str) -> bool {
+    let inner = name.strip_prefix('s').and_then(|n| n.strip_suffix(".png"));
+    inner.is_some_and(|n| n.contains("_v") && n.bytes().all(|b| b.is_ascii_digit() || b == b'_' || b == b'v'))
+}
+
+/// What `build` does before its stages: answers the stamp of what was done, empty if nothing had to
+/// be.
+pub(crate) fn for_build(
+    recording: &mut Recording,
+    folder: &mut RunFolder,
+    seed: u64,
+    watcher: &dyn Watcher,
+) -> Result<String> {
+    let needs = Needs::of(recording)?;
+    if needs == (Needs { registration: false, masks: false }) {
+        return Ok(String::new());
+    }
+    let own = stamp(&[&folder.record.fingerprint, &seed, &STAGE]);
+    if folder.is_done(STAGE, &own) {
+        watcher.say(&format!("{STAGE:<7} kept"));
+        restore(recording, &folder.folder(STAGE))?;
+        return Ok(own);
+    }
+    let start = Instant::now();
+    let at = folder.begin(STAGE, &own, true)?;
+    let mut prepared = Prepared::default();
+    let progress = watcher.stage(STAGE);
+    if needs.registration {
+        let found = register(recording, seed, &progress)?;
+        watcher.say(&sentence(&found));
+        prepared.registration = Some(found);
+    }
+    if needs.masks {
+        watcher.say("the recording has no masks: the object is taken for what moves and what that hangs on");
+        let report = find_masks(recording, &at, seed, &progress)?;
+        report.doubts.iter().for_each(|d| watcher.say(&format!("doubt: {d}")));
+        contact_sheet(recording)?.save(at.join("masks.png")).map_err(Failure::io(&at))?;
+        prepared.masks = Some(report);
+    }
+    drop(progress);
+    write_json(&at.join("prepare.json"), &prepared)?;
+    folder.finish(STAGE, &own, start.elapsed().as_secs_f64())?;
+    watcher.say(&format!("{STAGE:<7} {:.1} s", start.elapsed().as_secs_f64()));
+    Ok(own)
+}
+
+/// Puts what a run's folder `prepare/` holds into the recording.
+fn restore(recording: &mut Recording, at: &Path) -> Result<()> {
+    let path = at.join("prepare.json");
+    let text = std::fs::read(&path).map_err(Failure::io(&path))?;
+    let prepared: Prepared = serde_json::from_slice(&text).map_err(|e| {
+        Failure::new(format!("not what this program writes: {e}"), path.display().to_string(), "build again")
+    })?;
+    if let Some(found) = &prepared.registration {
+        apply(recording, &found.common_from_state);
+    }
+    if prepared.masks.is_some() {
+        for frame in 0..recording.frames.len() {
+            let mask: PathBuf = at.join(mask_name(recording, frame));
+            if recording.frames[frame].split == Split::Train && mask.is_file() {
+                recording.frames[frame].mask = Some(mask);
+            }
+        }
+    }
+    Ok(())
+}
+
+/// The recording of a run, as its stages saw it.
+///
+/// # Errors
+/// When it is gone or cannot be read.
+pub fn recording_of(run: &RunFolder) -> Result<Recording> {
+    let mut recording = Recording::open(&run.record.recording)?;
+    if run.has(STAGE) {
+        restore(&mut recording, &run.folder(STAGE))?;
+    }
+    Ok(recording)
+}
+
+/// How sure a registration is, for a person.
+pub fn sentence(found: &Registration) -> String {
+    let used = found.pairs.iter().filter(|p| p.used);
+    let worst = used.min_by(|a, b| a.share.total_cmp(&b.share));
+    worst.map_or("one state: nothing to register".into(), |p| {
+        format!(
+            "{} states brought into one frame: of what two scans both see at least {:.0} % agrees (states {} and {}; second best place {:.0} % as good)",
+            found.common_from_state.len(),
+            100.0 * p.share,
+            p.states.0,
+            p.states.1,
+            100.0 * p.second
+        )
+    })
+}
+
+fn failure(e: PrepareError, recording: &Recording) -> Failure {
+    let place = recording.root.display().to_string();
+    let hint = match &e {
+        PrepareError::Empty { .. } => "record that state again from nearer; does its depth have the right unit?",
+        PrepareError::Apart { .. } => {
+            "record with more overlap: the same side of the object, floor and wall around it, in every scan"
+        }
+        PrepareError::Ambiguous { .. } => {
+            "put a few things around the object that stay where they are, and have them in every scan"
+        }
+        PrepareError::NothingMoved { .. } => {
+            "move every part by more than its own thickness between scans; or give masks of the object"
+        }
+        PrepareError::NoFocus => "point the camera at the object; check poses and the unit of depth",
+        PrepareError::Depths(_) => "run `hingecast check` on the recording",
+        PrepareError::Cancelled(_) => "",
+    };
+    match e {
+        PrepareError::Cancelled(c) => c.into(),
+        PrepareError::Depths(d) => match d.downcast::<Failure>() {
+            Ok(own) => *own,
+            Err(d) => Failure::new(d.to_string(), place, hint),
+        },
+        e => Failure::new(e.to_string(), place, hint),
+    }
+}

@@ -1,0 +1,142 @@
+//! What is left without the room's planes, in pieces that do not touch each other.
+
+use super::planes::Plane;
+use super::{Room, cell, place};
+use glam::{IVec3, Vec3};
+use hingecast_articulate::DepthView;
+use hingecast_articulate::observe::lattice::Lattice;
+
+/// Pixels, over all views and states, that make a cell count.
+const PIXELS: u16 = 3;
+/// Cells farther apart than this, along an axis, do not touch.
+const TOUCH: i32 = 2;
+/// Pieces with at least this share of the moved samples of the largest belong to the object.
+const ALSO: f64 = 0.25;
+/// Pieces with at least this share are named.
+const NAMED: f64 = 0.05;
+/// Beyond this share of z, times pixels, a neighbour lies on another surface.
+const JUMP: f32 = 4.0;
+
+/// Cells with something in them that is not the room's.
+pub(super) struct Pieces {
+    lattice: Lattice,
+    counts: Vec<u16>,
+}
+
+/// The cells of the object.
+pub(super) struct Object {
+    pub lattice: Lattice,
+    pub cells: Vec<bool>,
+}
+
+impl Pieces {
+    pub fn new(lattice: Lattice) -> Self {
+        Self { lattice, counts: vec![0; lattice.len()] }
+    }
+
+    /// Counts the pixels of a view; not those between two surfaces, which time-of-flight cameras
+    /// make.
+    pub fn add(&mut self, view: &DepthView, supports: &[Plane]) {
+        let world_from_camera = view.camera.camera_from_world.inverse();
+        let (rot, trans) = (world_from_camera.mat3().as_mat3(), world_from_camera.trans.as_vec3());
+        let w = view.camera.width;
+        for i in 0..view.depth.len() {
+            let Some(x) = place(view, &rot, trans, i).filter(|_| !flies(view, i, w)) else { continue };
+            if supports.iter().any(|p| p.holds(x)) {
+                continue;
+            }
+            if let Some(c) = self.lattice.index(x) {
+                self.counts[c] = self.counts[c].saturating_add(1);
+            }
+        }
+    }
+
+    /// The pieces that moved surface is on.
+    pub fn object(&self, room: &Room, doubts: &mut Vec<String>) -> Object {
+        let size = self.lattice.size;
+        let index = |c: IVec3| ((c.z * size.y + c.y) * size.x + c.x) as usize;
+        let coords = |i: usize| {
+            let i = i as i32;
+            IVec3::new(i % size.x, i / size.x % size.y, i / (size.x * size.y))
+        };
+        let full = |i: usize| self.counts[i] >= PIXELS;
+        let mut piece = vec![0u32; self.counts.len()];
+        let mut count = 0;
+        for start in 0..piece.len() {
+            if piece[start] > 0 || !full(start) {
+                continue;
+            }
+            count += 1;
+            piece[start] = count;
+            let mut open = vec![start];
+            while let Some(i) = open.pop() {
+                let at = coords(i);
+                let (lo, hi) = ((at - TOUCH).max(IVec3::ZERO), (at + TOUCH).min(size - IVec3::ONE));
+                for z in lo.z..=hi.z {
+                    for y in lo.y..=hi.y {
+                        for x in lo.x..=hi.x {
+                            let j = index(IVec3::new(x, y, z));
+                            if piece[j] == 0 && full(j) {
+                                piece[j] = count;
+                                open.push(j);
+                            }
+                        }
+                    }
+                }
+            }
+        }
+        let mut moved = vec![0usize; count as usize + 1];
+        for (cloud, m) in room.clouds.iter().zip(&room.moved) {
+            for (x, _) in cloud.points.iter().zip(m).filter(|(_, m)| **m) {
+                if let Some(i) = self.lattice.index(*x) {
+                    moved[piece[i] as usize] += 1;
+                }
+            }
+        }
+        moved[0] = 0;
+        let most = moved.iter().copied().max().unwrap_or(0) as f64;
+        let own: Vec<bool> = moved.iter().map(|m| *m > 0 && *m as f64 >= ALSO * most).collect();
+        let others = moved.iter().zip(&own).filter(|(m, own)| !**own && **m as f64 >= NAMED * most).count();
+        if others > 0 {
+            doubts.push(format!("{others} other thing(s) moved apart from the object and were left out"));
+        }
+        let together = own.iter().filter(|o| **o).count();
+        if together > 1 {
+            doubts.push(format!("the object is in {together} pieces that do not touch"));
+        }
+        Object { lattice: self.lattice, cells: piece.iter().map(|p| own[*p as usize]).collect() }
+    }
+}
+
+/// Whether a pixel hangs between the surfaces beside it.
+fn flies(view: &DepthView, i: usize, w: usize) -> bool {
+    let z = view.depth[i];
+    let jump = JUMP / view.camera.fx as f32 * z * 2.0;
+    let off = |j: Option<usize>| {
+        let j = j.filter(|&j| j < view.depth.len() && view.class[j] == hingecast_articulate::OBJECT);
+        j.is_some_and(|j| (view.depth[j] - z).abs() > jump)
+    };
+    let across = off((i % w > 0).then(|| i - 1)) && off((i % w + 1 < w).then_some(i + 1));
+    let along = off(i.checked_sub(w)) && off(Some(i + w));
+    across || along
+}
+
+impl Object {
+    pub fn has(&self, x: Vec3) -> bool {
+        self.lattice.index(x).is_some_and(|i| self.cells[i])
+    }
+
+    /// Lowest and highest corner.
+    pub fn bounds(&self) -> (Vec3, Vec3) {
+        let size = self.lattice.size;
+        let (mut lo, mut hi) = (Vec3::INFINITY, Vec3::NEG_INFINITY);
+        for i in (0..self.cells.len()).filter(|&i| self.cells[i]) {
+            let k = i as i32;
+            let at = IVec3::new(k % size.x, k / size.x % size.y, k / (size.x * size.y)).as_vec3();
+            lo = lo.min(self.lattice.lo + at * self.lattice.voxel);
+            hi = hi.max(self.lattice.lo + (at + Vec3::ONE) * self.lattice.voxel);
+        }
+        debug_assert!(cell(&self.lattice, lo).min_element() >= 0 || !lo.is_finite());
+        (lo, hi)
+    }
+}

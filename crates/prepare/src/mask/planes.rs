@@ -1,0 +1,158 @@
+//! Floor, table, wall: large flat surfaces with everything that moves on one side of them.
+
+use super::Room;
+use glam::{DMat3, DVec3, Vec3};
+use nalgebra::Matrix3;
+
+/// Planes that are sought.
+const MOST: usize = 8;
+/// Samples that are tried as planes.
+const TRIES: usize = 160;
+/// A plane has at least this share of all samples.
+const LEAST: f64 = 0.03;
+/// Samples of a plane face within this cosine of it.
+const FACES: f32 = 0.94;
+/// Share of what moves that may lie behind a support, and how far that counts as behind, voxels.
+const BEHIND: f64 = 0.03;
+const DEEP: f32 = 1.5;
+/// A support is at least so many times as large as what moves (along it), and covers this share of
+/// what is seen along both of its directions.
+const LARGER: f32 = 1.5;
+const COVERS: f32 = 0.5;
+
+/// A flat surface: `normal . x = offset`.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Plane {
+    /// Unit, towards the cameras.
+    pub normal: Vec3,
+    pub offset: f32,
+    /// Farther than this from it is something else, scene units.
+    pub tolerance: f32,
+}
+
+impl Plane {
+    /// Signed distance, positive towards the cameras.
+    pub fn height(&self, x: Vec3) -> f32 {
+        self.normal.dot(x) - self.offset
+    }
+
+    /// Whether a place belongs to it: on it, or behind it.
+    pub fn holds(&self, x: Vec3) -> bool {
+        self.height(x) < self.tolerance
+    }
+}
+
+/// The planes of the room.
+pub(super) fn supports(room: &Room, up: Vec3, seed: u64) -> Vec<Plane> {
+    let voxel = room.lattice.voxel;
+    let (mut still, mut moved) = (Vec::new(), Vec::new());
+    for (cloud, m) in room.clouds.iter().zip(&room.moved) {
+        for i in 0..cloud.points.len() {
+            if m[i] { moved.push(cloud.points[i]) } else { still.push((cloud.points[i], cloud.normals[i])) }
+        }
+    }
+    let all: Vec<Vec3> = still.iter().map(|s| s.0).chain(moved.iter().copied()).collect();
+    let mut rng = fastrand::Rng::with_seed(seed);
+    let least = (LEAST * all.len() as f64) as usize;
+    let mut out: Vec<Plane> = Vec::new();
+    for _ in 0..MOST {
+        let Some((plane, members)) = largest(&still, voxel, &mut rng) else { break };
+        if members.len() < least {
+            break;
+        }
+        let points: Vec<Vec3> = members.iter().map(|&i| still[i].0).collect();
+        if is_support(&plane, &points, &moved, &all, up, voxel) {
+            out.push(plane);
+        }
+        let mut taken = members.into_iter().peekable();
+        let mut k = 0;
+        still.retain(|_| {
+            let gone = taken.next_if_eq(&k).is_some();
+            k += 1;
+            !gone
+        });
+    }
+    out
+}
+
+/// The plane with most samples, refined, and its samples in order.
+fn largest(samples: &[(Vec3, Vec3)], voxel: f32, rng: &mut fastrand::Rng) -> Option<(Plane, Vec<usize>)> {
+    if samples.len() < 50 {
+        return None;
+    }
+    let members = |n: Vec3, offset: f32, within: f32| -> Vec<usize> {
+        let on = |&i: &usize| {
+            let (x, m) = samples[i];
+            (n.dot(x) - offset).abs() < within && m.dot(n) > FACES
+        };
+        (0..samples.len()).filter(on).collect()
+    };
+    let every = (samples.len() / 4000).max(1);
+    let votes = |n: Vec3, offset: f32| {
+        let on = samples.iter().step_by(every).filter(|(x, m)| (n.dot(*x) - offset).abs() < voxel && m.dot(n) > FACES);
+        on.count()
+    };
+    let tries = (0..TRIES).map(|_| samples[rng.usize(0..samples.len())]);
+    let (x, n) = tries.max_by_key(|(x, n)| votes(*n, n.dot(*x)))?;
+    let (mut normal, mut offset) = (n, n.dot(x));
+    for within in [1.5, 1.0, 1.0] {
+        let own = members(normal, offset, within * voxel);
+        if own.len() < 12 {
+            return None;
+        }
+        (normal, offset) = fitted(own.iter().map(|&i| samples[i].0), normal);
+    }
+    let own = members(normal, offset, 1.5 * voxel);
+    let mut off: Vec<f32> = own.iter().map(|&i| (normal.dot(samples[i].0) - offset).abs()).collect();
+    let middle = off.len() / 2;
+    let median = *off.select_nth_unstable_by(middle, f32::total_cmp).1;
+    let tolerance = (5.0 * median).clamp(0.3 * voxel, 1.5 * voxel);
+    Some((Plane { normal, offset, tolerance }, own))
+}
+
+/// Total least squares; the normal on the side of `towards`.
+fn fitted(points: impl Iterator<Item = Vec3>, towards: Vec3) -> (Vec3, f32) {
+    let points: Vec<DVec3> = points.map(|x| x.as_dvec3()).collect();
+    let centre = points.iter().sum::<DVec3>() / points.len() as f64;
+    let mut m = DMat3::ZERO;
+    for x in &points {
+        let d = *x - centre;
+        m += DMat3::from_cols(d * d.x, d * d.y, d * d.z);
+    }
+    let eigen = Matrix3::from_column_slice(&m.to_cols_array()).symmetric_eigen();
+    let k = eigen.eigenvalues.imin();
+    let n = DVec3::new(eigen.eigenvectors[(0, k)], eigen.eigenvectors[(1, k)], eigen.eigenvectors[(2, k)]);
+    let n = if n.dot(towards.as_dvec3()) < 0.0 { -n } else { n };
+    (n.as_vec3(), n.dot(centre) as f32)
+}
+
+fn is_support(plane: &Plane, points: &[Vec3], moved: &[Vec3], all: &[Vec3], up: Vec3, voxel: f32) -> bool {
+    let behind = moved.iter().filter(|x| plane.height(**x) < -DEEP * voxel).count();
+    if behind as f64 > BEHIND * moved.len() as f64 {
+        return false;
+    }
+    let up_along = up - plane.normal * up.dot(plane.normal);
+    let a =
+        up_along.try_normalize().filter(|_| up_along.length() > 0.1).unwrap_or(plane.normal.any_orthonormal_vector());
+    let sides = [a, plane.normal.cross(a)];
+    let size = |points: &[Vec3]| sides.map(|s| spread(points, s));
+    let (own, seed, seen) = (size(points), size(moved), size(all));
+    let larger = own[0] * own[1] > LARGER * seed[0] * seed[1];
+    // Under the lowest of all, whatever its size: the floor may be seen in patches only.
+    let lowest = plane.normal.dot(up) > 0.9 && {
+        let below = all.iter().filter(|x| plane.height(**x) < -DEEP * voxel).count();
+        (below as f64) < BEHIND * all.len() as f64
+    };
+    larger && (lowest || (0..2).all(|k| own[k] > COVERS * seen[k]))
+}
+
+/// Length along a direction, without the outermost hundredths.
+fn spread(points: &[Vec3], along: Vec3) -> f32 {
+    let mut at: Vec<f32> = points.iter().map(|x| x.dot(along)).collect();
+    if at.is_empty() {
+        return 0.0;
+    }
+    let last = at.len() - 1;
+    let mut of = |share: f64| *at.select_nth_unstable_by((last as f64 * share) as usize, f32::total_cmp).1;
+    of(0.99) - of(0.01)
+}
