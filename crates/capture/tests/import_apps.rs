@@ -288,6 +288,35 @@ fn stray_scanner() {
     assert!(e.place.ends_with("rgb.mp4") && e.hint.contains("ffmpeg -noautorotate -i"), "{e}");
 }
 
+/// Pictures of the film are found by their number, also of a film without a steady rate.
+#[test]
+fn stray_scanner_with_its_film() {
+    let (_dir, src) = folder();
+    stray(&src, "pictures", 0);
+    // Five pictures, the last three of them half a second late, as phones do under load.
+    let made = std::process::Command::new("ffmpeg")
+        .args(["-nostdin", "-v", "error", "-framerate", "30", "-i"])
+        .arg(src.join("pictures/%06d.jpg"))
+        .args(["-vf", "setpts='if(gt(N,1),PTS+0.5/TB,PTS)'", "-fps_mode", "vfr", "-qscale:v", "2"])
+        .arg(src.join("rgb.mp4"))
+        .status();
+    if !made.is_ok_and(|status| status.success()) {
+        eprintln!("skipped: there is no ffmpeg (5.1 or newer)");
+        return;
+    }
+    verify(&src, Format::Stray);
+    let two = Config { max_views: 2, min_confidence: 0, ..Default::default() };
+    let (recording, _) = imported(&src, &two).unwrap();
+    assert_eq!(recording.frames.len(), 2);
+    (0..2).for_each(|i| shows(&recording, i, POINTS[0]));
+    // One row more than the film has pictures.
+    let csv = std::fs::read_to_string(src.join("odometry.csv")).unwrap();
+    let last = csv.lines().last().unwrap();
+    std::fs::write(src.join("odometry.csv"), format!("{csv}{last}\n")).unwrap();
+    let e = imported(&src, &Config::default()).unwrap_err();
+    assert!(e.what.contains("5 of 6 pictures") && e.place.ends_with("rgb.mp4"), "{e}");
+}
+
 #[test]
 fn polycam_raw_data() {
     let (_dir, src) = folder();

@@ -230,6 +230,10 @@ fn convert<P: AsRef<Path>>(
 /// that folder.
 fn find(src: &Path, scratch: &mut Scratch) -> Result<PathBuf, CaptureError> {
     let mut found = src.to_path_buf();
+    if !src.exists() {
+        let hint = "check the path: a folder, or a .r3d or .zip";
+        return Err(CaptureError::new("the source is not there", src.display().to_string(), hint));
+    }
     if src.is_file() && unpack::is_zip(src) {
         found = scratch.folder()?;
         unpack::unpack(src, &found)?;
