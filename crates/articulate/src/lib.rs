@@ -50,7 +50,7 @@ pub use doubt::Doubt;
 pub use error::{ArticulateError, DepthError};
 pub use find::{Articulation, find};
 pub use label::labelled::Labelled;
-pub use observe::depth_view::{BACKGROUND, DepthView, OBJECT, UNKNOWN};
+pub use observe::depth_view::{BACKGROUND, DepthView, OBJECT, OTHER, UNKNOWN};
 pub use observe::evidence::MOST_STATES;
 pub use passes::driver::PassRecord;
 pub use pictures::information::Information;

@@ -18,5 +18,5 @@ mod scan;
 
 pub use error::PrepareError;
 pub use mask::{MaskReport, Masks, object_masks};
-pub use register::{Registration, register};
+pub use register::{Registration, register, steady};
 pub use scan::Scan;

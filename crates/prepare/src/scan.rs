@@ -29,9 +29,10 @@ pub struct Scan {
 
 impl Scan {
     /// What `views`, all of one state, saw. Pixels of class `OBJECT` count: without masks, all that
-    /// have depth. `None` when hardly any has.
-    pub fn new(views: &[DepthView]) -> Option<Self> {
-        let (lo, hi) = extent(views)?;
+    /// have depth. `None` when hardly any has. `around`: space around it that is looked at, shares
+    /// of the longest side.
+    pub fn new(views: &[DepthView], around: f32) -> Option<Self> {
+        let (lo, hi) = extent(views, around)?;
         let lattice = Lattice::new(lo, hi, COARSE);
         let fine_voxel = (hi - lo).max_element() / FINE as f32;
         let stride = views.first()?.stride_for(PIXELS);
@@ -66,7 +67,7 @@ impl Scan {
 }
 
 /// Box of what the views saw, without strays.
-fn extent(views: &[DepthView]) -> Option<(Vec3, Vec3)> {
+fn extent(views: &[DepthView], around: f32) -> Option<(Vec3, Vec3)> {
     let mut axes: [Vec<f32>; 3] = Default::default();
     for view in views {
         let (w, stride) = (view.camera.width, 7);
@@ -87,6 +88,6 @@ fn extent(views: &[DepthView]) -> Option<(Vec3, Vec3)> {
     };
     let lo = Vec3::from_array(std::array::from_fn(|a| at(&mut axes[a], STRAY)));
     let hi = Vec3::from_array(std::array::from_fn(|a| at(&mut axes[a], 1.0 - STRAY)));
-    let room = 0.02 * (hi - lo).max_element();
+    let room = around * (hi - lo).max_element();
     (room > 0.0).then_some((lo - Vec3::splat(room), hi + Vec3::splat(room)))
 }

@@ -5,7 +5,7 @@ mod common;
 use common::{block, cupboard, room, views};
 use glam::{DQuat, DVec3};
 use hingecast_geom::{Pose, Progress};
-use hingecast_prepare::{PrepareError, register, register::Freedom};
+use hingecast_prepare::{PrepareError, register, register::Freedom, steady};
 
 fn own_worlds(n: usize, tilt: f64) -> Vec<Pose> {
     let mut rng = fastrand::Rng::with_seed(5);
@@ -60,4 +60,42 @@ fn a_square_block_alone_is_ambiguous() {
     let mut states: Vec<_> = (0..2).map(|k| views(&scene, &worlds[k], 12, k as u64)).collect();
     let found = register(&mut states, Freedom::AboutUp(DVec3::Z), 0, &Progress::default());
     assert!(matches!(found, Err(PrepareError::Ambiguous { .. })), "{found:?}");
+}
+
+/// Views of the cupboard alone, masked: the room's depth stays, and frees what is before it.
+fn masked(door_deg: f64, push: Pose, seed: u64) -> Vec<hingecast_articulate::DepthView> {
+    let scene = [room(), cupboard(door_deg, push)].concat();
+    let first = room().len() as u8 + 1;
+    common::cameras(12, seed)
+        .into_iter()
+        .map(|camera| {
+            let (depth, which) = common::picture(&camera, &scene);
+            let class = which.iter().map(|k| match *k {
+                0 => hingecast_articulate::UNKNOWN,
+                k if k >= first => hingecast_articulate::OBJECT,
+                _ => hingecast_articulate::OTHER,
+            });
+            hingecast_articulate::DepthView { class: class.collect(), camera, depth }
+        })
+        .collect()
+}
+
+#[test]
+fn a_push_is_taken_out_and_a_door_is_not() {
+    for (mm, deg) in [(0.0, 0.0), (5.0, 0.3), (30.0, 2.0), (60.0, 3.0)] {
+        let push = Pose::new(DQuat::from_rotation_z(f64::to_radians(deg)), DVec3::new(0.6 * mm, -0.8 * mm, 0.0) * 1e-3);
+        // Pushed in state 2, and left there.
+        let mut states: Vec<_> =
+            (0..5).map(|k| masked(25.0 * k as f64, if k < 2 { Pose::IDENTITY } else { push }, k as u64)).collect();
+        let found = steady(&mut states, DVec3::Z, 0, &Progress::default()).unwrap();
+        let middle = Pose::from_trans(DVec3::new(0.1, 0.75, 0.0));
+        for (state, common_from_state) in found.iter().enumerate() {
+            let stood = if state < 2 { Pose::IDENTITY } else { middle * push * middle.inverse() };
+            let off = *common_from_state * stood;
+            let (turn, shift) = (off.angle().to_degrees(), (off.apply(middle.trans) - middle.trans).length());
+            println!("{mm} mm {deg} deg state {state}: {turn:.4} deg {shift:.5} m");
+            assert!(turn < 0.05 && shift < 0.001, "{mm} mm, state {state}: off by {turn} deg, {shift} m");
+            assert!(mm > 0.0 || *common_from_state == Pose::IDENTITY, "nobody pushed: {common_from_state:?}");
+        }
+    }
 }

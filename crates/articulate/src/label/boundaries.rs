@@ -7,7 +7,7 @@
 
 use super::labelled::{Labelled, far_off_plane};
 use crate::model::motions::poses_of;
-use crate::observe::depth_view::{BACKGROUND, DepthView, OBJECT};
+use crate::observe::depth_view::{BACKGROUND, DepthView, OBJECT, OTHER};
 use crate::observe::evidence::Evidence;
 use crate::observe::sample::Motion;
 use glam::{DVec2, Vec3};
@@ -56,7 +56,7 @@ impl Witness {
         for i in [first, first + 1, first + c.width, first + c.width + 1] {
             match self.view.class[i] {
                 OBJECT if (self.view.depth[i] - x.z).abs() < same => return 1,
-                OBJECT => through &= self.view.depth[i] > x.z,
+                OBJECT | OTHER => through &= self.view.depth[i] > x.z,
                 class => through &= class == BACKGROUND,
             }
         }

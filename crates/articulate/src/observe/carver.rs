@@ -1,6 +1,6 @@
 //! Which cells of the lattice a camera looks through.
 
-use super::depth_view::{BACKGROUND, DepthView, OBJECT};
+use super::depth_view::{BACKGROUND, DepthView, OBJECT, OTHER};
 use super::lattice::Lattice;
 use glam::{IVec3, Vec3};
 
@@ -18,9 +18,9 @@ impl Carver {
     pub(super) fn new(view: &DepthView, margin: f32) -> Self {
         let (w, h) = (view.camera.width, view.camera.height);
         // Empty up to the depth; forever where only background is; not at all where nothing is
-        // known. A pixel with depth outside the mask is a ragged mask's, not background.
+        // known.
         let own = |i: usize| match view.class[i] {
-            OBJECT => view.depth[i] - margin,
+            OBJECT | OTHER => view.depth[i] - margin,
             BACKGROUND => f32::INFINITY,
             _ => 0.0,
         };

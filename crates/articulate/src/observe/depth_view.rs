@@ -12,6 +12,9 @@ use hingecast_geom::Camera;
 pub const BACKGROUND: u8 = 0;
 /// The object, at a known depth.
 pub const OBJECT: u8 = 1;
+/// Something else at a known depth - floor, wall, what a ragged mask leaves out -: the camera looked
+/// through everything before it.
+pub const OTHER: u8 = 3;
 /// Says nothing: a hand, a hole in the depth.
 pub const UNKNOWN: u8 = 2;
 
@@ -20,9 +23,9 @@ pub const UNKNOWN: u8 = 2;
 pub struct DepthView {
     /// OpenCV camera; its pose is `camera_from_world`.
     pub camera: Camera,
-    /// z, scene units; only read where `class` is [`OBJECT`].
+    /// z, scene units; only read where `class` is [`OBJECT`] or [`OTHER`].
     pub depth: Vec<f32>,
-    /// [`OBJECT`], [`BACKGROUND`] or [`UNKNOWN`] of every pixel.
+    /// [`OBJECT`], [`OTHER`], [`BACKGROUND`] or [`UNKNOWN`] of every pixel.
     pub class: Vec<u8>,
 }
 

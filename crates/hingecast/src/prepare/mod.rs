@@ -34,6 +34,17 @@ pub struct Prepared {
     pub registration: Option<Registration>,
     /// How the object was found, where there were no masks. Its masks lie beside.
     pub masks: Option<MaskReport>,
+    /// Of every state: the frame of the object as state 0 has it, from the recording's; where it
+    /// was pushed as a whole. Empty: never.
+    #[serde(default)]
+    pub pushes: Vec<Pose>,
+}
+
+impl Prepared {
+    /// Whether the recording was as it should be.
+    fn is_nothing(&self) -> bool {
+        self.registration.is_none() && self.masks.is_none() && self.pushes.is_empty()
+    }
 }
 
 /// What a recording lacks.
@@ -77,6 +88,7 @@ pub fn register(recording: &mut Recording, seed: u64, progress: &Progress) -> Re
     };
     let found = found.map_err(|e| failure(e, recording))?;
     apply(recording, &found.common_from_state);
+    recording.registered = true;
     Ok(found)
 }
 
@@ -86,7 +98,6 @@ fn apply(recording: &mut Recording, common_from_state: &[Pose]) {
             frame.camera.camera_from_world = frame.camera.camera_from_world * common_from_own.inverse();
         }
     }
-    recording.registered = true;
 }
 
 /// Finds the object and writes its masks into `folder`, one PNG a training frame, named as the
@@ -131,16 +142,13 @@ pub(crate) fn for_build(
     seed: u64,
     watcher: &dyn Watcher,
 ) -> Result<String> {
-    let needs = Needs::of(recording)?;
-    if needs == (Needs { registration: false, masks: false }) {
-        return Ok(String::new());
-    }
     let own = stamp(&[&folder.record.fingerprint, &seed, &STAGE]);
     if folder.is_done(STAGE, &own) {
         watcher.say(&format!("{STAGE:<7} kept"));
-        restore(recording, &folder.folder(STAGE))?;
-        return Ok(own);
+        let prepared = restore(recording, &folder.folder(STAGE))?;
+        return Ok(if prepared.is_nothing() { String::new() } else { own });
     }
+    let needs = Needs::of(recording)?;
     let start = Instant::now();
     let at = folder.begin(STAGE, &own, true)?;
     let mut prepared = Prepared::default();
@@ -157,15 +165,41 @@ pub(crate) fn for_build(
         contact_sheet(recording)?.save(at.join("masks.png")).map_err(Failure::io(&at))?;
         prepared.masks = Some(report);
     }
+    prepared.pushes = take_pushes_out(recording, seed, &progress, watcher)?;
     drop(progress);
     write_json(&at.join("prepare.json"), &prepared)?;
     folder.finish(STAGE, &own, start.elapsed().as_secs_f64())?;
     watcher.say(&format!("{STAGE:<7} {:.1} s", start.elapsed().as_secs_f64()));
-    Ok(own)
+    Ok(if prepared.is_nothing() { String::new() } else { own })
+}
+
+/// Brings states in which the object as a whole stands elsewhere back to where it stood.
+fn take_pushes_out(
+    recording: &mut Recording,
+    seed: u64,
+    progress: &Progress,
+    watcher: &dyn Watcher,
+) -> Result<Vec<Pose>> {
+    let mut depths = RawDepths::masked(recording);
+    let found = hingecast_prepare::steady(&mut depths, recording.up, seed, progress);
+    let pushes = found.map_err(|e| failure(e, recording))?;
+    if pushes.iter().all(|p| *p == Pose::IDENTITY) {
+        return Ok(Vec::new());
+    }
+    let middle = depths.middle()?;
+    for (state, push) in pushes.iter().enumerate().filter(|(_, p)| **p != Pose::IDENTITY) {
+        let far = (push.apply(middle) - middle).length();
+        let far = if recording.metric { format!("{:.0} mm", 1e3 * far) } else { format!("{far:.3} scene units") };
+        let turn = push.angle().to_degrees();
+        watcher
+            .say(&format!("state {state}: the object as a whole stood {far} and {turn:.1} deg elsewhere; taken out"));
+    }
+    apply(recording, &pushes);
+    Ok(pushes)
 }
 
 /// Puts what a run's folder `prepare/` holds into the recording.
-fn restore(recording: &mut Recording, at: &Path) -> Result<()> {
+fn restore(recording: &mut Recording, at: &Path) -> Result<Prepared> {
     let path = at.join("prepare.json");
     let text = std::fs::read(&path).map_err(Failure::io(&path))?;
     let prepared: Prepared = serde_json::from_slice(&text).map_err(|e| {
@@ -173,6 +207,7 @@ fn restore(recording: &mut Recording, at: &Path) -> Result<()> {
     })?;
     if let Some(found) = &prepared.registration {
         apply(recording, &found.common_from_state);
+        recording.registered = true;
     }
     if prepared.masks.is_some() {
         for frame in 0..recording.frames.len() {
@@ -182,7 +217,8 @@ fn restore(recording: &mut Recording, at: &Path) -> Result<()> {
             }
         }
     }
-    Ok(())
+    apply(recording, &prepared.pushes);
+    Ok(prepared)
 }
 
 /// The recording of a run, as its stages saw it.

@@ -11,16 +11,30 @@ const KEPT: usize = 512 << 20;
 /// Share of the points, at each end of every axis, that may lie outside the extent.
 const STRAY: f64 = 0.005;
 
+/// Views of a state that say whether the object was pushed.
+const SOME: usize = 16;
+
 /// The training views of a recording.
 pub(super) struct RawDepths {
     cache: ViewCache,
     frames: Vec<Vec<usize>>,
+    masked: bool,
 }
 
 impl RawDepths {
     pub fn new(recording: &Recording) -> Self {
         let frames = (0..recording.n_states).map(|s| recording.frames_of(s, Split::Train)).collect();
-        Self { cache: ViewCache::new(recording, KEPT), frames }
+        Self { cache: ViewCache::new(recording, KEPT), frames, masked: false }
+    }
+
+    /// Some views of every state, with their masks.
+    pub fn masked(recording: &Recording) -> Self {
+        let mut own = Self { masked: true, ..Self::new(recording) };
+        for frames in &mut own.frames {
+            let n = frames.len().min(SOME);
+            *frames = (0..n).map(|k| frames[k * frames.len() / n]).collect();
+        }
+        own
     }
 
     fn view(&self, frame: usize) -> Result<DepthView> {
@@ -29,9 +43,23 @@ impl RawDepths {
             let place = self.cache.recording().frames[frame].color.display().to_string();
             return Err(Failure::new("a picture has no depth", place, "add depth_file_path to every frame"));
         }
+        if self.masked {
+            return Ok(crate::stages::parts::depth_view(&view));
+        }
         let known = |i: usize| if view.depth[i] > 0.0 && view.usable[i] == 1 { OBJECT } else { UNKNOWN };
         let class = (0..view.depth.len()).map(known).collect();
         Ok(DepthView { camera: view.camera, depth: view.depth.clone(), class })
+    }
+}
+
+impl RawDepths {
+    /// The middle of what is seen.
+    pub fn middle(&mut self) -> Result<glam::DVec3> {
+        let (lo, hi) = self.extent().map_err(|e| match e.downcast::<Failure>() {
+            Ok(own) => *own,
+            Err(e) => Failure::new(e.to_string(), "the recording", "run `hingecast check` on it"),
+        })?;
+        Ok(0.5 * (lo + hi).as_dvec3())
     }
 }
 

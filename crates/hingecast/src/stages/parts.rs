@@ -4,17 +4,21 @@ use super::inputs::Inputs;
 use crate::artifacts::Parts;
 use crate::failure::Result;
 use glam::Vec3;
-use hingecast_articulate::{BACKGROUND, DepthError, DepthView, Depths, Labelled, OBJECT, PassRecord, UNKNOWN, find};
+use hingecast_articulate::{
+    BACKGROUND, DepthError, DepthView, Depths, Labelled, OBJECT, OTHER, PassRecord, UNKNOWN, find,
+};
 use hingecast_capture::View;
 use hingecast_geom::Progress;
 use rayon::prelude::*;
 
 /// Pixels of a view as the search for parts wants them.
-fn depth_view(view: &View) -> DepthView {
+pub(crate) fn depth_view(view: &View) -> DepthView {
     let class = |i: usize| match (view.usable[i], view.mask[i], view.depth[i] > 0.0) {
         (1, 1, true) => OBJECT,
         (1, 0, false) => BACKGROUND,
-        // A hand, a hole, or depth outside a ragged mask.
+        // The room, or what a ragged mask leaves out.
+        (1, 0, true) => OTHER,
+        // A hand, or a hole.
         _ => UNKNOWN,
     };
     let class = (0..view.mask.len()).map(class).collect();

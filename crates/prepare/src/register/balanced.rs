@@ -34,6 +34,13 @@ pub(super) fn draw(cloud: &Cloud, up: Vec3, count: usize, seed: u64) -> Vec<usiz
     out
 }
 
+/// Every so many samples of the cloud, whatever they face: as much as there is surface.
+pub(super) fn evenly(cloud: &Cloud, count: usize) -> (Vec<Vec3>, Vec<Vec3>) {
+    let every = cloud.points.len().div_ceil(count.max(1)).max(1);
+    let some = (0..cloud.points.len()).step_by(every);
+    (some.clone().map(|i| cloud.points[i]).collect(), some.map(|i| cloud.normals[i]).collect())
+}
+
 /// The samples themselves.
 pub(super) fn pick(cloud: &Cloud, count: usize, seed: u64) -> (Vec<Vec3>, Vec<Vec3>) {
     let some = draw(cloud, Vec3::Z, count, seed);

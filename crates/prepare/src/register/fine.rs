@@ -17,8 +17,8 @@ const ROUNDS: usize = 5;
 const SAMPLES: usize = 12_000;
 
 /// One round of Gauss and Newton. `gate`: farthest neighbour, scene units; `scale`: residual at
-/// which a sample's weight has fallen to a quarter (Geman and McClure). Returns the pose and the median
-/// absolute residual of the samples within the gate.
+/// which a sample's weight has fallen to a quarter (Geman and McClure). Returns the pose, and
+/// the lower quartile and the median of the absolute residuals within the gate.
 pub(super) fn step(
     points: &[Vec3],
     normals: &[Vec3],
@@ -26,7 +26,7 @@ pub(super) fn step(
     pose: Pose,
     gate: f32,
     scale: f64,
-) -> (Pose, f64) {
+) -> (Pose, [f64; 2]) {
     let (rot, trans) = (pose.mat3().as_mat3(), pose.trans.as_vec3());
     let centre = pose.apply(points.iter().sum::<Vec3>().as_dvec3() / points.len().max(1) as f64);
     let order: Vec<usize> = (0..points.len()).collect();
@@ -60,16 +60,16 @@ pub(super) fn step(
         residuals.extend(cr);
     }
     if residuals.len() < 30 {
-        return (pose, f64::INFINITY);
+        return (pose, [f64::INFINITY; 2]);
     }
-    let middle = residuals.len() / 2;
-    let median = *residuals.select_nth_unstable_by(middle, f64::total_cmp).1;
+    let last = residuals.len() - 1;
+    let off = [last / 4, last / 2].map(|k| *residuals.select_nth_unstable_by(k, f64::total_cmp).1);
     let damping = 1e-6 * a.trace() / 6.0;
-    let Some(x) = (a + Matrix6::identity() * damping).cholesky().map(|c| c.solve(&b)) else { return (pose, median) };
+    let Some(x) = (a + Matrix6::identity() * damping).cholesky().map(|c| c.solve(&b)) else { return (pose, off) };
     let turn = quat_from_rotation_vector(DVec3::new(x[0], x[1], x[2]));
     let shift = DVec3::new(x[3], x[4], x[5]);
     let about_centre = Pose::new(turn, centre + shift - turn * centre);
-    (about_centre * pose, median)
+    (about_centre * pose, off)
 }
 
 /// The poses of all states (frame of state 0 from each), refined together from `start`.
@@ -97,7 +97,7 @@ pub(super) fn together(scans: &[Scan], start: Vec<Pose>, seed: u64) -> Vec<Pose>
                 let surface = Surface::new(points, normals);
                 let (mut pose, mut scale) = (poses[s], if round == 0 { voxel as f64 } else { 0.5 * voxel as f64 });
                 for _ in 0..4 {
-                    let (better, median) = step(&own[s].0, &own[s].1, &surface, pose, 2.0 * voxel, scale);
+                    let (better, [_, median]) = step(&own[s].0, &own[s].1, &surface, pose, 2.0 * voxel, scale);
                     pose = better;
                     scale = (3.0 * median).clamp(0.05 * voxel as f64, voxel as f64);
                 }

@@ -8,7 +8,10 @@
 mod balanced;
 mod fine;
 mod pair;
+mod steady;
 mod votes;
+
+pub use steady::steady;
 
 use crate::error::PrepareError;
 use crate::scan::Scan;
@@ -19,6 +22,8 @@ use serde::{Deserialize, Serialize};
 
 /// Up to so many states every pair is tried; beyond, each with the first and the two before it.
 const ALL_PAIRS: usize = 8;
+/// Space around a scan that is looked at, shares of its longest side.
+const AROUND: f32 = 0.02;
 /// Fewer coarse samples hold no scan.
 const FEW: usize = 200;
 /// A pair agrees when this share of the samples that can be judged does.
@@ -75,7 +80,7 @@ pub fn register(
     let mut scans = Vec::new();
     for state in 0..n {
         progress.report(state, n, "scans")?;
-        let scan = Scan::new(&depths.views(state)?);
+        let scan = Scan::new(&depths.views(state)?, AROUND);
         let samples = scan.as_ref().map_or(0, |s| s.coarse.points.len());
         scans.push(scan.filter(|_| samples >= FEW).ok_or(PrepareError::Empty { state, samples })?);
     }

@@ -54,24 +54,20 @@ pub(super) fn align(source: &Scan, target: &Scan, freedom: Freedom, seed: u64) -
     }
     let judges = (Judges::new(source, seed ^ 2), Judges::new(target, seed ^ 3));
     let surface = Surface::new(target.coarse.points.clone(), target.coarse.normals.clone());
-    let refined = |starts: Vec<Pose>, gates: &[f32], every: usize| {
+    let all_refined = |starts: Vec<Pose>, gates: &[f32], every: usize| {
         let mut out: Vec<(Pose, f64)> = starts
             .into_par_iter()
             .map(|start| {
-                let pick = |v: &Vec<Vec3>| v.iter().step_by(every).copied().collect::<Vec<_>>();
-                let (points, normals) = (pick(&judges.0.points), pick(&judges.0.normals));
-                let pose = gates.iter().fold(start, |pose, gate| {
-                    fine::step(&points, &normals, &surface, pose, gate * voxel, f64::from(0.5 * gate * voxel)).0
-                });
-                (pose, score(&judges, source, target, &pose).0)
+                let pose = refined(&judges.0, every, &surface, start, gates, voxel);
+                (pose, score(&judges.0, &judges.1, source, target, &pose).0)
             })
             .collect();
         out.sort_by(|a, b| b.1.total_cmp(&a.1));
         distinct(out, &judges.0.points, 4.0 * voxel)
     };
-    let mut found = refined(starts, &[4.0, 4.0, 3.0, 3.0, 2.0, 2.0], 3);
+    let mut found = all_refined(starts, &[4.0, 4.0, 3.0, 3.0, 2.0, 2.0], 3);
     found.truncate(FINALISTS);
-    let found = refined(found.into_iter().map(|f| f.0).collect(), &[3.0, 2.0, 1.5, 1.5, 1.5, 1.5], 1);
+    let found = all_refined(found.into_iter().map(|f| f.0).collect(), &[3.0, 2.0, 1.5, 1.5, 1.5, 1.5], 1);
     let Some(&(pose, best)) = found.first() else {
         return Ok(Placed {
             pose: Pose::IDENTITY,
@@ -82,7 +78,7 @@ pub(super) fn align(source: &Scan, target: &Scan, freedom: Freedom, seed: u64) -
             centre: DVec3::ZERO,
         });
     };
-    let (_, share) = score(&judges, source, target, &pose);
+    let (_, share) = score(&judges.0, &judges.1, source, target, &pose);
     let rival = found.get(1);
     let away = |other: &Pose| ((pose.inverse() * *other).angle(), farthest(&pose, other, &judges.0.points));
     Ok(Placed {
@@ -96,14 +92,21 @@ pub(super) fn align(source: &Scan, target: &Scan, freedom: Freedom, seed: u64) -
 }
 
 /// Samples that judge a place, facings balanced.
-struct Judges {
-    points: Vec<Vec3>,
-    normals: Vec<Vec3>,
+pub(super) struct Judges {
+    pub points: Vec<Vec3>,
+    pub normals: Vec<Vec3>,
 }
 
 impl Judges {
-    fn new(scan: &Scan, seed: u64) -> Self {
+    pub fn new(scan: &Scan, seed: u64) -> Self {
         let (points, normals) = balanced::pick(&scan.coarse, JUDGES, seed);
+        Self { points, normals }
+    }
+
+    /// The same by surface: an object has no floor that drowns the rest, but thin edges that
+    /// would.
+    pub fn by_surface(scan: &Scan) -> Self {
+        let (points, normals) = balanced::evenly(&scan.coarse, JUDGES);
         Self { points, normals }
     }
 
@@ -122,11 +125,27 @@ impl Judges {
 
 /// What agrees less what contradicts over all judges of both scans, and what agrees over what can be
 /// judged.
-fn score(judges: &(Judges, Judges), source: &Scan, target: &Scan, pose: &Pose) -> (f64, f64) {
-    let (a, b) = (judges.0.judge(target, pose), judges.1.judge(source, &pose.inverse()));
+pub(super) fn score(own: &Judges, theirs: &Judges, source: &Scan, target: &Scan, pose: &Pose) -> (f64, f64) {
+    let (a, b) = (own.judge(target, pose), theirs.judge(source, &pose.inverse()));
     let (yes, no) = ((a.0 + b.0) as f64, (a.1 + b.1) as f64);
-    let all = (judges.0.points.len() + judges.1.points.len()) as f64;
+    let all = (own.points.len() + theirs.points.len()) as f64;
     ((yes - no) / all.max(1.0), yes / (yes + no).max(1.0))
+}
+
+/// A place refined on every so many judges; gates in voxels.
+pub(super) fn refined(
+    judges: &Judges,
+    every: usize,
+    surface: &Surface,
+    start: Pose,
+    gates: &[f32],
+    voxel: f32,
+) -> Pose {
+    let pick = |v: &Vec<Vec3>| v.iter().step_by(every).copied().collect::<Vec<_>>();
+    let (points, normals) = (pick(&judges.points), pick(&judges.normals));
+    gates.iter().fold(start, |pose, gate| {
+        fine::step(&points, &normals, surface, pose, gate * voxel, f64::from(0.5 * gate * voxel)).0
+    })
 }
 
 /// Without those that are within `near` of a better one.
@@ -141,18 +160,18 @@ fn distinct(sorted: Vec<(Pose, f64)>, points: &[Vec3], near: f32) -> Vec<(Pose, 
 }
 
 /// Farthest that one of the points lies from itself in two poses.
-fn farthest(a: &Pose, b: &Pose, points: &[Vec3]) -> f64 {
+pub(super) fn farthest(a: &Pose, b: &Pose, points: &[Vec3]) -> f64 {
     let every = (points.len() / 64).max(1);
     let far = |x: &Vec3| (a.apply(x.as_dvec3()) - b.apply(x.as_dvec3())).length();
     points.iter().step_by(every).map(far).fold(0.0, f64::max)
 }
 
 /// The turn that brings `up` to z.
-fn upright(up: DVec3) -> DQuat {
+pub(super) fn upright(up: DVec3) -> DQuat {
     DQuat::from_rotation_arc(up.normalize_or(DVec3::Z), DVec3::Z)
 }
 
-fn voters(scan: &Scan, up: DQuat, seed: u64) -> Upright {
+pub(super) fn voters(scan: &Scan, up: DQuat, seed: u64) -> Upright {
     let turn = up.as_quat();
     let some = balanced::draw(&scan.coarse, turn.inverse() * Vec3::Z, VOTERS, seed);
     Upright {

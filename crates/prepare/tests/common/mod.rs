@@ -34,7 +34,15 @@ pub fn room() -> Vec<Block> {
 pub fn cupboard(door_deg: f64, push: Pose) -> Vec<Block> {
     let middle = DVec3::new(0.1, 0.75, 0.0);
     let moved = Pose::from_trans(middle) * push * Pose::from_trans(-middle);
-    let body = block([0.1, 0.77, 0.45], [0.8, 0.38, 0.9], 0.0);
+    // Back, sides, bottom, a board, top: hollow, as cupboards are.
+    let panels = [
+        block([0.1, 0.95, 0.45], [0.8, 0.02, 0.9], 0.0),
+        block([-0.29, 0.77, 0.45], [0.02, 0.38, 0.9], 0.0),
+        block([0.49, 0.77, 0.45], [0.02, 0.38, 0.9], 0.0),
+        block([0.1, 0.77, 0.05], [0.8, 0.38, 0.02], 0.0),
+        block([0.1, 0.8, 0.5], [0.78, 0.3, 0.02], 0.0),
+        block([0.1, 0.77, 0.89], [0.8, 0.38, 0.02], 0.0),
+    ];
     // The hinge stands at the left edge of the front.
     let hinge = Pose::new(DQuat::from_rotation_z(-door_deg.to_radians()), DVec3::new(-0.3, 0.57, 0.45));
     let door = Block {
@@ -45,7 +53,8 @@ pub fn cupboard(door_deg: f64, push: Pose) -> Vec<Block> {
         half: DVec3::new(0.015, 0.02, 0.08),
         world_from_block: hinge * Pose::from_trans(DVec3::new(0.74, -0.04, 0.0)),
     };
-    [body, door, handle].map(|b| Block { world_from_block: moved * b.world_from_block, ..b }).to_vec()
+    let all = panels.into_iter().chain([door, handle]);
+    all.map(|b| Block { world_from_block: moved * b.world_from_block, ..b }).collect()
 }
 
 /// What a camera sees: z, 0 where nothing is; and which block, from 1.
