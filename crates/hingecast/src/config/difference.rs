@@ -11,7 +11,8 @@ const NAMED: usize = 5;
 /// One line, `None` where nothing differs; `before` is the run's `config.toml`.
 pub fn sentence(before: &str, now: &Config) -> Option<String> {
     let before = flat(&before.parse().ok()?);
-    let now = flat(&Table::try_from(now).ok()?);
+    // By its text, too: only there are 32-bit numbers as short as they were.
+    let now = flat(&toml::to_string_pretty(now).ok()?.parse().ok()?);
     let keys: std::collections::BTreeSet<&String> = before.keys().chain(now.keys()).collect();
     let said = |value: Option<&String>| value.map_or("none", String::as_str).to_string();
     let mut differ: Vec<String> = keys
