@@ -64,6 +64,17 @@ pub enum Doubt {
         /// How much the recording tells it.
         nats: f64,
     },
+    /// Limits that a person gave leave out recorded states.
+    LimitsLeaveOut {
+        /// Name of the joint.
+        joint: String,
+        /// Indices of the states.
+        states: Vec<usize>,
+        /// How far the farthest of them is beyond, radians or scene units.
+        by: f64,
+        /// It is an angle.
+        turns: bool,
+    },
     /// Anything else, as a sentence.
     Other {
         /// What a person reads.
@@ -79,6 +90,7 @@ impl Doubt {
             | Self::LooseAxis { joint, .. }
             | Self::LoosePivot { joint, .. }
             | Self::MayFollow { joint, .. }
+            | Self::LimitsLeaveOut { joint, .. }
             | Self::Unseen { joint, .. } => Some(joint),
             Self::TwoPieces { part, .. } => Some(part),
             Self::NothingMoves | Self::Unexplained { .. } | Self::TwoStates | Self::Other { .. } => None,
@@ -97,6 +109,7 @@ impl Doubt {
             | Self::LooseAxis { joint, .. }
             | Self::LoosePivot { joint, .. }
             | Self::MayFollow { joint, .. }
+            | Self::LimitsLeaveOut { joint, .. }
             | Self::Unseen { joint, .. }
                 if joint == old =>
             {
@@ -150,9 +163,28 @@ impl fmt::Display for Doubt {
                 "two states only: parts that moved alike (two drawers pulled out equally far) come out as one; if that \
                  may be so, record more states, or move one part at a time"
             ),
+            Self::LimitsLeaveOut { joint, states, by, turns } => {
+                let by = if *turns { format!("{:.1} deg", by.to_degrees()) } else { format!("{by:.4} units") };
+                write!(
+                    f,
+                    "joint '{joint}': its limits leave out state{} {}, by up to {by}: the twin cannot go where the object was",
+                    if states.len() == 1 { "" } else { "s" },
+                    listed(states)
+                )
+            }
             Self::Other { sentence } => write!(f, "{sentence}"),
         }
     }
+}
+
+/// The first few of many.
+fn listed(states: &[usize]) -> String {
+    const SHOWN: usize = 8;
+    let mut names: Vec<String> = states.iter().take(SHOWN).map(usize::to_string).collect();
+    if states.len() > SHOWN {
+        names.push(format!("and {} more", states.len() - SHOWN));
+    }
+    names.join(", ")
 }
 
 fn kind_name(kind: JointKind) -> &'static str {

@@ -109,8 +109,8 @@ pub struct Demo {
 
 #[derive(Args, Debug)]
 pub struct Synth {
-    /// Folder or file of the object, or the name of a sample (see objects/) or of one in
-    /// $HINGECAST_DATA.
+    /// Folder or file of the object, or the name of a sample (objects/ here, in $HINGECAST_OBJECTS or
+    /// above the program, as target/release is) or of one in $HINGECAST_DATA.
     pub object: String,
     /// Recording folder to write; the truth goes to <OUT>.truth.
     #[arg(long, short)]

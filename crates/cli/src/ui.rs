@@ -79,10 +79,16 @@ impl Ui {
             let bar = ProgressBar::new(1).with_prefix(format!("{name:<7}"));
             let style = ProgressStyle::with_template("{prefix} [{bar:30}] {percent:>3} %  {elapsed} eta {eta}  {msg}");
             bar.set_style(style.expect("a fixed template").progress_chars("=> "));
+            let pace = Mutex::new((Pace::default(), Instant::now()));
             return Progress::new(
                 move |done, total, note| {
                     bar.set_length(total as u64);
                     bar.set_position(done as u64);
+                    let mut pace = pace.lock().unwrap_or_else(|e| e.into_inner());
+                    let now = pace.1.elapsed().as_secs_f64();
+                    if pace.0.begins(done, total, now) {
+                        bar.reset_eta();
+                    }
                     if !note.is_empty() {
                         bar.set_message(note.to_string());
                     }
@@ -91,20 +97,55 @@ impl Ui {
             );
         }
         let (name, start) = (name.to_string(), Instant::now());
-        let last = Mutex::new(start);
+        let said = Mutex::new((start, Pace::default()));
         Progress::new(
             move |done, total, note| {
-                let mut last = last.lock().unwrap_or_else(|e| e.into_inner());
+                let mut said = said.lock().unwrap_or_else(|e| e.into_inner());
+                let (last, pace) = &mut *said;
+                let spent = start.elapsed().as_secs_f64();
+                pace.begins(done, total, spent);
                 if last.elapsed() >= LINE_EVERY && done > 0 {
                     *last = Instant::now();
-                    let spent = start.elapsed().as_secs_f64();
-                    let eta = spent * (total as f64 / done as f64 - 1.0);
+                    let eta = pace.eta(done, spent).map_or(String::new(), |s| format!(", eta {s:.0} s"));
                     let percent = 100.0 * done as f64 / total as f64;
-                    tell(&format!("{name:<7} {percent:>3.0} %  {spent:.0} s, eta {eta:.0} s  {note}"));
+                    tell(&format!("{name:<7} {percent:>3.0} %  {spent:.0} s{eta}  {note}"));
                 }
             },
             cancel,
         )
+    }
+}
+
+/// How fast the work goes, by what was done since the stage first told of it: a training that goes
+/// on from a checkpoint did not do the steps before within these seconds.
+#[derive(Default)]
+struct Pace {
+    total: usize,
+    /// Done, and seconds since the stage began, when this was first told.
+    from: (usize, f64),
+    last: usize,
+}
+
+impl Pace {
+    /// Whether another stretch of work begins: the first, another number of steps, or fewer done
+    /// than before.
+    fn begins(&mut self, done: usize, total: usize, now: f64) -> bool {
+        let other = total != self.total || done < self.last;
+        if other {
+            // A first step was done just before it is told, unless it is a late one.
+            let late = self.total > 0 || done > 1;
+            self.from = if late { (done, now) } else { (0, 0.0) };
+            self.total = total;
+        }
+        self.last = done;
+        other
+    }
+
+    /// Seconds to go; `None` where nothing tells.
+    fn eta(&self, done: usize, now: f64) -> Option<f64> {
+        let (from, since) = self.from;
+        let steps = done.checked_sub(from).filter(|n| *n > 0)?;
+        Some((now - since) / steps as f64 * self.total.saturating_sub(done) as f64)
     }
 }
 
@@ -119,5 +160,27 @@ impl Watcher for Ui {
 
     fn complain(&self, failure: &Failure) {
         self.complain(failure);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Steps before a resumption counted as if they had been done since: 10 s instead of 90.
+    #[test]
+    fn the_time_to_go_leaves_out_earlier_work() {
+        let mut pace = Pace::default();
+        assert!(pace.begins(901, 1000, 1.0));
+        assert_eq!(pace.eta(901, 1.0), None);
+        assert!(!pace.begins(911, 1000, 11.0));
+        assert_eq!(pace.eta(911, 11.0), Some(89.0));
+        // A fresh one, which tells of each step.
+        let mut pace = Pace::default();
+        pace.begins(1, 5, 10.0);
+        assert_eq!(pace.eta(1, 10.0), Some(40.0));
+        // The next stretch of the same stage.
+        assert!(pace.begins(0, 50, 60.0));
+        assert_eq!(pace.eta(10, 80.0), Some(80.0));
     }
 }

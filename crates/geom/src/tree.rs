@@ -86,6 +86,14 @@ pub struct Joint {
     pub limits: [f64; 2],
 }
 
+impl Joint {
+    /// Lowest and highest value of the recording, the first state's 0 included: what [`Self::limits`]
+    /// are until a person says otherwise.
+    pub fn seen(&self) -> [f64; 2] {
+        self.values.iter().fold([0.0; 2], |[lo, hi], v| [lo.min(*v), hi.max(*v)])
+    }
+}
+
 /// How sure the depth makes one of a joint: standard deviations, and what else it might be.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Certainty {

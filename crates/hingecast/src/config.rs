@@ -1,5 +1,7 @@
 //! The resolved configuration of a build: preset < config file < flags and `--set`.
 
+pub mod difference;
+
 use crate::failure::{Failure, Result};
 use crate::overrides::JointOverride;
 use hingecast_articulate as articulate;

@@ -5,7 +5,7 @@ use crate::artifacts::{Extent, Joints};
 use crate::failure::{Failure, Result};
 use glam::DVec3;
 use hingecast_articulate::Doubt;
-use hingecast_geom::JointKind;
+use hingecast_geom::{Joint, JointKind, KinematicTree};
 use serde::{Deserialize, Serialize};
 
 /// One `[[joint]]` entry; what it leaves out stays as found.
@@ -43,6 +43,10 @@ const FARTHEST: f64 = 20.0;
 /// Most that a hinge turns.
 const MOST_TURNS: f64 = 10.0;
 
+/// What limits may leave out of the range that was seen, share of it, before it is a doubt: nobody
+/// writes down all digits of a value.
+const ROUNDED: f64 = 0.005;
+
 /// Applies the entries in order, to joints of an object of this `size`.
 ///
 /// # Errors
@@ -53,7 +57,24 @@ pub fn apply(file: &mut Joints, entries: &[JointOverride], size: &Extent) -> Res
         one(file, entry, size)
             .map_err(|(what, hint)| Failure::new(what, format!("[[joint]] number {}", k + 1), hint))?;
     }
+    file.doubts.extend(left_out(&file.tree));
     file.tree.validate().map_err(|e| Failure::new(e, "[[joint]]", "change 'parent'"))
+}
+
+/// A doubt for every joint with recorded states beyond its limits: those that nobody corrected are
+/// the range that was seen.
+fn left_out(tree: &KinematicTree) -> Vec<Doubt> {
+    let doubt = |j: &Joint| {
+        let [lo, hi] = j.limits;
+        let beyond = |v: f64| (lo - v).max(v - hi);
+        let [least, most] = j.seen();
+        let states: Vec<usize> =
+            (0..j.values.len()).filter(|s| beyond(j.values[*s]) > ROUNDED * (most - least)).collect();
+        let (joint, by, turns) = (j.name.clone(), beyond(least).max(beyond(most)), j.screw.kind.turns());
+        (!states.is_empty()).then_some(Doubt::LimitsLeaveOut { joint, states, by, turns })
+    };
+    let limited = |j: &&Joint| !matches!(j.screw.kind, JointKind::Fixed | JointKind::Continuous);
+    tree.joints.iter().filter(limited).filter_map(doubt).collect()
 }
 
 /// Takes out what a person says is no coupling, and the doubts about it.
@@ -127,7 +148,7 @@ fn one(file: &mut Joints, entry: &JointOverride, size: &Extent) -> std::result::
         if screw.kind == JointKind::Fixed {
             joint.values.iter_mut().for_each(|v| *v = 0.0);
         }
-        joint.limits = joint.values.iter().fold([0.0f64; 2], |l, v| [l[0].min(*v), l[1].max(*v)]);
+        joint.limits = joint.seen();
     }
     if let Some([lo, hi]) = entry.limits {
         if !(lo <= hi) {
@@ -151,7 +172,7 @@ fn one(file: &mut Joints, entry: &JointOverride, size: &Extent) -> std::result::
 #[cfg(test)]
 mod tests {
     use super::*;
-    use hingecast_geom::{Joint, KinematicTree, Screw};
+    use hingecast_geom::Screw;
 
     fn door() -> Joints {
         let screw = Screw { kind: JointKind::Revolute, axis: DVec3::Z, pivot: DVec3::ZERO };
@@ -165,6 +186,32 @@ mod tests {
         let size = Extent { lo: [0.0; 3], hi: [1.0; 3], diagonal: 1.7 };
         let entry = JointOverride { joint: "joint_1".into(), ..entry };
         apply(&mut door(), &[entry], &size).map_err(|e| e.what).err().unwrap_or_default()
+    }
+
+    /// They once went into the twin without a word, and the report called them the range seen.
+    #[test]
+    fn limits_that_leave_out_recorded_states_are_a_doubt() {
+        let size = Extent { lo: [0.0; 3], hi: [1.0; 3], diagonal: 1.7 };
+        let doubts = |limits: [f64; 2], kind: Option<JointKind>| {
+            let mut file = door();
+            let entry = JointOverride {
+                joint: "joint_1".into(),
+                name: Some("door".into()),
+                limits: Some(limits),
+                kind,
+                ..Default::default()
+            };
+            apply(&mut file, &[entry], &size).unwrap();
+            file.doubts.iter().map(Doubt::to_string).collect::<Vec<_>>()
+        };
+        // It was seen to 57.2958 degrees; a person writes 57.2.
+        assert!(doubts([0.0, 57.2], None).is_empty());
+        assert!(doubts([0.0, 90.0], None).is_empty());
+        let [short] = &doubts([0.0, 50.0], None)[..] else { panic!("no doubt") };
+        assert!(short.contains("joint 'door': its limits leave out state 1, by up to 7.3 deg"), "{short}");
+        let [both] = &doubts([10.0, 50.0], None)[..] else { panic!("no doubt") };
+        assert!(both.contains("states 0, 1, by up to 10.0 deg"), "{both}");
+        assert!(doubts([0.0, 50.0], Some(JointKind::Continuous)).is_empty());
     }
 
     /// Off by powers of ten, they once took all memory, or all time.

@@ -124,6 +124,48 @@ impl RunFolder {
         Ok(Self { root: root.to_path_buf(), record })
     }
 
+    /// Opens a run that has a twin of the recording as it was when the run was last built.
+    ///
+    /// # Errors
+    /// No run, or one that is not finished.
+    pub fn open_finished(root: &Path) -> Result<Self> {
+        let run = Self::open(root)?;
+        run.finished()?;
+        Ok(run)
+    }
+
+    /// Asked by whoever reads a run: files of an earlier build stay in its folders until their stages
+    /// are done again.
+    ///
+    /// # Errors
+    /// The stage `twin` is not done.
+    pub fn finished(&self) -> Result<()> {
+        if self.has("twin") {
+            return Ok(());
+        }
+        let last = self.record.stages.last().map_or("none", |s| s.name.as_str());
+        let hint = format!(
+            "finish it: hingecast build {} -o {}, with the --preset, --config and --set of before",
+            self.record.recording.display(),
+            self.root.display()
+        );
+        let what =
+            format!("the run is not finished for its recording: 'twin' is to come, the last stage done is {last}");
+        Err(Failure::new(what, self.root.join("run.json").display().to_string(), hint))
+    }
+
+    /// The same of whatever leads to a twin: a run, its twin folder, a file in that. Anything else is
+    /// nobody's run, and fine.
+    ///
+    /// # Errors
+    /// It is that of a run that is not finished.
+    pub fn refuse_unfinished(path: &Path) -> Result<()> {
+        let whole = path.canonicalize().unwrap_or_else(|_| path.to_path_buf());
+        let leads = |root: &Path| root == whole || whole.strip_prefix(root).is_ok_and(|rest| rest.starts_with("twin"));
+        let root = whole.ancestors().take(3).find(|root| leads(root) && Self::read(root).is_some());
+        root.map_or(Ok(()), |root| Self::open(root)?.finished())
+    }
+
     fn read(root: &Path) -> Option<RunRecord> {
         serde_json::from_slice(&std::fs::read(root.join("run.json")).ok()?).ok()
     }
@@ -258,4 +300,32 @@ pub fn read_json<T: for<'a> Deserialize<'a>>(path: &Path) -> Result<T> {
             "build again with --fresh",
         )
     })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// After a build that failed, the twin of the recording before was taken without a word.
+    #[test]
+    fn a_twin_of_an_unfinished_run_is_refused() {
+        let dir = tempfile::tempdir().unwrap();
+        let root = dir.path().join("run");
+        let mut run = RunFolder::create(&root).unwrap();
+        let model = root.join("twin/robot.xml");
+        std::fs::create_dir(root.join("twin")).unwrap();
+        std::fs::write(&model, "<mujoco/>").unwrap();
+        for path in [&root, &root.join("twin"), &model] {
+            let refused = RunFolder::refuse_unfinished(path).unwrap_err();
+            assert!(refused.what.contains("not finished") && refused.place.ends_with("run.json"), "{refused}");
+        }
+        assert!(RunFolder::open_finished(&root).is_err());
+        // Whose it is not.
+        RunFolder::refuse_unfinished(dir.path()).unwrap();
+        RunFolder::refuse_unfinished(&root.join("objects/robot.xml")).unwrap();
+
+        run.finish("twin", "a stamp", 1.0).unwrap();
+        RunFolder::refuse_unfinished(&model).unwrap();
+        assert!(RunFolder::open_finished(&root).is_ok());
+    }
 }

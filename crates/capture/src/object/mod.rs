@@ -120,7 +120,8 @@ impl ArticulatedObject {
     }
 
     /// Finds an OBJECT argument: a path, or a bare name in `objects/` (here or in
-    /// `$HINGECAST_OBJECTS`) or in `$HINGECAST_DATA/partnet-mobility-dev/`.
+    /// `$HINGECAST_OBJECTS`), in `$HINGECAST_DATA/partnet-mobility-dev/`, or in the `objects/` that
+    /// the running program lies below: that of the repository it was built in.
     ///
     /// # Errors
     /// When it is nowhere; the hint lists the places.
@@ -134,6 +135,7 @@ impl ArticulatedObject {
         let mut places = vec![PathBuf::from("objects")];
         places.extend(std::env::var_os("HINGECAST_OBJECTS").map(PathBuf::from));
         places.extend(std::env::var_os("HINGECAST_DATA").map(|d| PathBuf::from(d).join("partnet-mobility-dev")));
+        places.extend(std::env::current_exe().ok().as_deref().and_then(samples_above));
         if let Some(found) = places.iter().map(|p| p.join(argument)).find(is_object) {
             return Ok(found);
         }
@@ -141,7 +143,8 @@ impl ArticulatedObject {
         Err(CaptureError::new(
             format!("there is no object {argument}"),
             format!("looked for a path and in {}", listed.join(", ")),
-            "give a path to a URDF or MJCF file or its folder, or set HINGECAST_OBJECTS or HINGECAST_DATA",
+            "give a path to a URDF or MJCF file or its folder; or set HINGECAST_OBJECTS to the folder objects/ of the \
+             sources, or HINGECAST_DATA",
         ))
     }
 
@@ -254,6 +257,12 @@ fn flat_enough(file: &Path, xml: &roxmltree::Document) -> Result<(), CaptureErro
     }
     let what = format!("elements are nested {levels} levels deep, at most {MOST_LEVELS} are read");
     Err(CaptureError::new(what, file.display().to_string(), "flatten the tree of bodies"))
+}
+
+/// The nearest folder `objects` of samples beside the program or at most four folders above it:
+/// `target/release/`, or `target/<triple>/release/deps/`.
+fn samples_above(program: &Path) -> Option<PathBuf> {
+    program.ancestors().skip(1).take(5).map(|at| at.join("objects")).find(|at| at.join("hinged_box").is_dir())
 }
 
 /// The description file in a folder.

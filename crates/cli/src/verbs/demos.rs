@@ -104,7 +104,7 @@ fn new_task(session: &Session, args: &Demos, object: &Path, kind: TaskKind) -> R
         kind.name(),
         task.joint,
         object.display(),
-        task.scale,
+        hingecast_study::simulate::short(task.scale),
         1e3 * task.width
     ));
     if made.worked < made.of {

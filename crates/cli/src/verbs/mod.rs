@@ -21,8 +21,16 @@ mod train;
 
 use crate::cli::{Cli, Verb};
 use crate::ui::{Ui, answer};
-use hingecast::failure::Result;
+use hingecast::failure::{Failure, Result};
 use hingecast::{report, stage::RunFolder};
+use std::path::Path;
+
+/// A source to read: a typo in its name is no unknown layout.
+fn there(source: &Path) -> Result<()> {
+    let hint = "check the path: a folder as the app exports it, a .zip or a .r3d";
+    let missing = || Failure::new("there is no such file or folder", source.display().to_string(), hint);
+    if source.exists() { Ok(()) } else { Err(missing()) }
+}
 
 pub enum Outcome {
     Done,
@@ -65,7 +73,7 @@ pub fn run(cli: &Cli) -> Result<Outcome> {
     match &cli.verb {
         Verb::Demo(args) => demo::run(&session, args),
         Verb::Synth(args) => synth::run(&session, args),
-        Verb::Import(args) => import::run(&session, args),
+        Verb::Import(args) => args.sources.iter().try_for_each(|s| there(s)).and_then(|()| import::run(&session, args)),
         Verb::ImportObject(args) => import_object::run(&session, args),
         Verb::Mask(args) => mask::run(&session, args),
         Verb::Check(args) => check::run(&session, args),
@@ -96,11 +104,7 @@ pub fn run(cli: &Cli) -> Result<Outcome> {
 }
 
 #[cfg(not(feature = "mujoco"))]
-fn without_mujoco(verb: &str) -> hingecast::failure::Failure {
+fn without_mujoco(verb: &str) -> Failure {
     let hint = "scripts/fetch_mujoco.sh, then build with default features";
-    hingecast::failure::Failure::new(
-        "this hingecast was built without the simulator",
-        format!("hingecast {verb}"),
-        hint,
-    )
+    Failure::new("this hingecast was built without the simulator", format!("hingecast {verb}"), hint)
 }

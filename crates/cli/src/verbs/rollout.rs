@@ -3,7 +3,7 @@
 use super::{Outcome, Session};
 use crate::cli::Rollout;
 use hingecast::failure::{Failure, Result};
-use hingecast::stage::write_json;
+use hingecast::stage::{RunFolder, write_json};
 use hingecast_geom::folder::may_become;
 use hingecast_policy::Policy;
 use hingecast_policy::demos::read;
@@ -79,6 +79,8 @@ pub fn run(session: &Session, args: &Rollout) -> Result<Outcome> {
 }
 
 fn world(name: &str, object: &Path, spoil: Vec<Spoil>, task: &TaskSpec) -> Result<World> {
+    // Also where a policy remembers the twin of a run.
+    RunFolder::refuse_unfinished(object)?;
     let config = SceneConfig { object: object.to_path_buf(), spoil, visuals: false };
     Ok(World { name: name.to_string(), object: object.to_path_buf(), scene: Scene::new(&config, task)? })
 }

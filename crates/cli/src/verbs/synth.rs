@@ -45,7 +45,7 @@ pub fn run(session: &Session, args: &Synth) -> Result<Outcome> {
     let secs = start.elapsed().as_secs_f64();
     session.ui.say(&format!("{} images in {secs:.1} s -> {}", report.frames, report.recording.display()));
     for (name, [from, to]) in &report.ranges {
-        session.ui.say(&format!("  {name}: {from:.3} .. {to:.3}"));
+        session.ui.say(&format!("  {name}: {from:.3} .. {to:.3} (radians; slides: scene units)"));
     }
     session.answer(&serde_json::json!({
         "recording": report.recording, "truth": report.truth, "images": report.frames, "secs": secs,

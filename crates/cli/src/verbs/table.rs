@@ -47,6 +47,11 @@ pub fn detail(e: &Evaluation) -> String {
             s.part, s.chamfer, s.floor, s.visible_chamfer, s.visible_floor, s.f_score, s.precision, s.recall
         );
     }
+    let _ = writeln!(
+        out,
+        "(pivot, sweep: scene units; motion, state, range: degrees, of slides scene units; CD: 1e-3 square units, floor: what \
+         sampling alone gives; docs/metrics.md defines them)"
+    );
     for (name, p) in [("first state", &e.first_state), ("other states", &e.other_states)] {
         let _ = writeln!(
             out,
@@ -62,7 +67,7 @@ pub fn detail(e: &Evaluation) -> String {
     }
     let _ = write!(
         out,
-        "built in {:.0} s, peak memory {:.2} GB, {} doubts",
+        "all stages took {:.0} s, peak memory {:.2} GB, {} doubts",
         e.build_secs,
         e.peak_memory_gb,
         e.doubts.len()

@@ -72,7 +72,7 @@ impl Evaluation {
 /// # Errors
 /// When the run is unfinished, or run and truth are not of the same recording.
 pub fn evaluate(run: &Path, truth: &Path, progress: &Progress) -> Result<Evaluation> {
-    let folder = RunFolder::open(run)?;
+    let folder = RunFolder::open_finished(run)?;
     let truth = Truth::open(truth)?;
     let twin = TwinFile::read(run)?;
     let recording = recording_of(&folder, &truth)?;

@@ -26,6 +26,8 @@ pub(crate) struct HeldOut {
 
 pub(crate) struct Content {
     pub twin: TwinFile,
+    /// Lengths are metres; otherwise scene units.
+    pub metric: bool,
     /// Rows of photos with parts and axes; file, caption.
     pub overlays: Vec<(String, String)>,
     pub held_out: Vec<HeldOut>,
@@ -34,11 +36,19 @@ pub(crate) struct Content {
     pub trace: Vec<PassRecord>,
 }
 
+impl Content {
+    /// Of lengths.
+    pub fn unit(&self) -> &'static str {
+        if self.metric { "m" } else { "units" }
+    }
+}
+
 /// Writes the report of a finished run; answers the path of `index.html`.
 ///
 /// # Errors
 /// When the run is unfinished or its recording is gone.
 pub fn write(run: &RunFolder) -> Result<PathBuf> {
+    run.finished()?;
     let folder = run.folder("report");
     std::fs::create_dir_all(&folder).map_err(Failure::io(&folder))?;
     let twin = TwinFile::read(&run.root)?;
@@ -92,7 +102,8 @@ pub fn write(run: &RunFolder) -> Result<PathBuf> {
         }
     }
     let plot = plot::joint_values(&twin.tree, extent.diagonal);
-    let content = Content { twin, overlays, held_out, plot, trace: Parts::read_trace(&run.root) };
+    let metric = recording.metric;
+    let content = Content { twin, metric, overlays, held_out, plot, trace: Parts::read_trace(&run.root) };
     let path = folder.join("index.html");
     let text = html::page(run, &content);
     hingecast_geom::staging::write_whole(&path, text.as_bytes()).map_err(Failure::io(&path))?;

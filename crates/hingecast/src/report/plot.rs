@@ -27,7 +27,12 @@ pub fn joint_values(tree: &KinematicTree, diagonal: f64) -> String {
             .x_label_area_size(32)
             .y_label_area_size(44)
             .build_cartesian_2d(0.0..(n - 1).max(1) as f64, lo..hi * 1.05)?;
-        chart.configure_mesh().x_desc("state").y_desc("deg | % of diagonal").light_line_style(WHITE).draw()?;
+        chart
+            .configure_mesh()
+            .x_desc("state")
+            .y_desc("degrees (slides: % of the diagonal)")
+            .light_line_style(WHITE)
+            .draw()?;
         for (part, points) in &series {
             let color = color(PALETTE[part % PALETTE.len()]);
             chart.draw_series(LineSeries::new(points.iter().copied(), color.stroke_width(2)))?;

@@ -210,7 +210,11 @@ impl Cast<'_> {
     fn build(&mut self, recording: &Path, classical: bool) -> Result<Model> {
         let (host, plan) = (self.host, self.plan);
         let (kind, config) = if classical { ("track", &plan.track) } else { ("build", &plan.twin) };
-        let finished = |run: &PathBuf| run.join("twin/robot.xml").is_file() && method_of(run) == Some(config.method);
+        let finished = |run: &PathBuf| {
+            RunFolder::open_finished(run).is_ok()
+                && run.join("twin/robot.xml").is_file()
+                && method_of(run) == Some(config.method)
+        };
         if let Some(run) = plan.runs.iter().map(|r| r.join(self.name)).find(finished) {
             let stamps: Vec<String> = RunFolder::open(&run)?.record.stages.into_iter().map(|s| s.stamp).collect();
             return Ok(Model { file: twin_file(&run)?, stamp: hingecast::stage::stamp(&[&stamps]) });

@@ -4,6 +4,7 @@
 use super::rollout_plot;
 use crate::simulate::record::outcome_name;
 use crate::simulate::rollout::{EpisodeResult, WorldResult};
+use crate::simulate::short;
 use hingecast::failure::{Failure, Result};
 use hingecast::report::html::{doubts, escape, head};
 use hingecast_geom::staging::write_whole;
@@ -210,7 +211,7 @@ fn settings(out: &mut String, report: &RolloutReport) {
             rollout_plot::secs(task.horizon)
         ),
     );
-    row("size", format!("{} simulated metres per unit of the file", task.scale));
+    row("size", format!("{} simulated metres per unit of the file", short(task.scale)));
     row(
         "grasp",
         format!(

@@ -36,7 +36,7 @@ pub(super) fn success_over_time(results: &[WorldResult], horizon: usize) -> Stri
             .x_label_area_size(32)
             .y_label_area_size(44)
             .build_cartesian_2d(0.0..secs(until), 0.0..104.0)?;
-        chart.configure_mesh().x_desc("s").y_desc("% of the episodes").light_line_style(WHITE).draw()?;
+        chart.configure_mesh().x_desc("time, s").y_desc("% of the episodes").light_line_style(WHITE).draw()?;
         for (k, r) in results.iter().enumerate() {
             let color = color(PALETTE[ORDER[k % ORDER.len()]]);
             let line = LineSeries::new(steps_up(r, until), color.stroke_width(2));

@@ -9,6 +9,7 @@ pub mod teleop;
 use crate::host::Host;
 use hingecast::failure::{Failure, Result};
 use hingecast::import_object::{ImportConfig, import};
+use hingecast::stage::RunFolder;
 use hingecast_capture::object::ArticulatedObject;
 use std::path::{Path, PathBuf};
 
@@ -24,6 +25,7 @@ pub fn object_file(host: &Host, argument: &str, imported: Option<&Path>) -> Resu
         return Ok(PathBuf::from(argument));
     }
     let path = ArticulatedObject::resolve(argument)?;
+    RunFolder::refuse_unfinished(&path)?;
     let raw = path.join("mobility.urdf").is_file() || path.file_name().is_some_and(|n| n == "mobility.urdf");
     if !raw {
         return absolute(&hingecast_sim::object::model_file(&path)?);
@@ -47,8 +49,9 @@ pub fn imported_beside(demos: &Path) -> PathBuf {
 /// path.
 ///
 /// # Errors
-/// When no twin is there.
+/// When no twin is there, or it is of an earlier build than the run.
 pub fn twin_file(run: &Path) -> Result<PathBuf> {
+    RunFolder::refuse_unfinished(run)?;
     absolute(&hingecast_sim::object::model_file(run)?)
 }
 
@@ -63,4 +66,21 @@ fn absolute(path: &Path) -> Result<PathBuf> {
 /// When it cannot.
 pub fn may_write(file: &Path) -> Result<()> {
     hingecast_geom::staging::probe(file).map_err(Failure::io(file))
+}
+
+/// A factor as people write it: six digits at most, without what powers of two add to them.
+pub fn short(x: f64) -> f64 {
+    format!("{x:.5e}").parse().unwrap_or(x)
+}
+
+#[cfg(test)]
+mod tests {
+    /// `demos` once said "size x 0.8200000000000001".
+    #[test]
+    fn factors_are_short() {
+        assert_eq!(
+            format!("{} {} {}", super::short(0.8200000000000001), super::short(1.0), super::short(1e-3)),
+            "0.82 1 0.001"
+        );
+    }
 }

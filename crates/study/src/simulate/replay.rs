@@ -114,7 +114,7 @@ pub fn plot(demos: &Demos) -> String {
             .x_label_area_size(32)
             .y_label_area_size(52)
             .build_cartesian_2d(0.0..longest, lo..hi)?;
-        chart.configure_mesh().x_desc("s").y_desc(HEIGHT).light_line_style(WHITE).draw()?;
+        chart.configure_mesh().x_desc("time, s").y_desc(HEIGHT).light_line_style(WHITE).draw()?;
         for line in &lines {
             chart.draw_series(LineSeries::new(line.iter().copied(), BLUE.mix(0.25)))?;
         }

@@ -345,6 +345,8 @@ pub fn table(results: &[WorldResult]) -> String {
             out += &format!("    {}\n", failed.join(", "));
         }
     }
+    out += "(as true: ended where the first world's joint leads, to half a pad; s: median time to success; moved: mean share of the \
+            true range; gap: median distance between the ends; docs/simulation.md)\n";
     out
 }
 
