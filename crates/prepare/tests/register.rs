@@ -12,7 +12,8 @@ fn own_worlds(n: usize, tilt: f64) -> Vec<Pose> {
     let world = |k: usize| match k {
         0 => Pose::IDENTITY,
         _ => {
-            let turn = DQuat::from_rotation_z(rng.f64() * 6.28) * DQuat::from_rotation_x(tilt * rng.f64());
+            let turn =
+                DQuat::from_rotation_z(rng.f64() * std::f64::consts::TAU) * DQuat::from_rotation_x(tilt * rng.f64());
             Pose::new(turn, DVec3::new(rng.f64() * 4.0 - 2.0, rng.f64() * 4.0 - 2.0, rng.f64() * 2.0 - 1.0))
         }
     };

@@ -128,12 +128,6 @@ fn mask_name(recording: &Recording, frame: usize) -> String {
     format!("s{:03}_v{:03}{more}.png", f.state, f.view)
 }
 
-/// Whether `name` is one of those that [`find_masks`] gives.
-pub fn is_mask(name: &str) -> bool {
-    let inner = name.strip_prefix('s').and_then(|n| n.strip_suffix(".png"));
-    inner.is_some_and(|n| n.contains("_v") && n.bytes().all(|b| b.is_ascii_digit() || b == b'_' || b == b'v'))
-}
-
 /// What `build` does before its stages: answers the stamp of what was done, empty if nothing had to
 /// be.
 pub(crate) fn for_build(

@@ -116,7 +116,7 @@ fn flies(view: &DepthView, i: usize, w: usize) -> bool {
         let j = j.filter(|&j| j < view.depth.len() && view.class[j] == hingecast_articulate::OBJECT);
         j.is_some_and(|j| (view.depth[j] - z).abs() > jump)
     };
-    let across = off((i % w > 0).then(|| i - 1)) && off((i % w + 1 < w).then_some(i + 1));
+    let across = off((!i.is_multiple_of(w)).then(|| i - 1)) && off((i % w + 1 < w).then_some(i + 1));
     let along = off(i.checked_sub(w)) && off(Some(i + w));
     across || along
 }

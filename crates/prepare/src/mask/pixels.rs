@@ -64,7 +64,7 @@ fn without_specks(mask: &mut [u8], w: usize, value: u8) {
             let i = blob[next];
             next += 1;
             let beside = [
-                (i % w > 0).then(|| i - 1),
+                (!i.is_multiple_of(w)).then(|| i - 1),
                 (i % w + 1 < w).then_some(i + 1),
                 i.checked_sub(w),
                 Some(i + w).filter(|j| *j < mask.len()),
