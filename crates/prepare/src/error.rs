@@ -47,6 +47,12 @@ pub enum PrepareError {
         /// Samples that moved.
         samples: usize,
     },
+    /// What moved lies on nothing that can be told from the room.
+    #[error("no object was found: what it would be holds only {percent:.0} % of what moved")]
+    NoObject {
+        /// Share of moved surface on the largest piece, percent.
+        percent: f64,
+    },
     /// The cameras look at nothing in common.
     #[error("the cameras look at nothing in common that has depth")]
     NoFocus,

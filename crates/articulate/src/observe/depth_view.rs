@@ -45,7 +45,7 @@ impl DepthView {
     }
 
     /// Standard deviation of z over z, from second differences of inverse depth along the rows.
-    fn noise(&self) -> f32 {
+    pub fn noise(&self) -> f32 {
         let w = self.camera.width;
         let mut second: Vec<f32> = (0..self.depth.len())
             .skip(1)

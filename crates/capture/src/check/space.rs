@@ -36,6 +36,13 @@ pub(super) fn check(documents: &[Document], recording: &Recording, looks: &[Opti
         out.push(finding);
         return;
     }
+    if !recording.registered {
+        // What lies where says nothing before the worlds are brought together.
+        let place = format!("{}: registered = false", recording.root.display());
+        let hint = "nothing to do: `hingecast build` brings them together, or says what it lacks";
+        out.push(warning("own-worlds", "each state has a world of its own".into(), place, hint));
+        return;
+    }
     states_apart(recording, looks, &by_state, out);
     out.extend(super::motion::nothing_moves(recording, looks, &by_state));
 }

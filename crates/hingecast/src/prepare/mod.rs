@@ -138,9 +138,12 @@ pub(crate) fn for_build(
 ) -> Result<String> {
     let own = stamp(&[&folder.record.fingerprint, &seed, &STAGE]);
     if folder.is_done(STAGE, &own) {
-        watcher.say(&format!("{STAGE:<7} kept"));
         let prepared = restore(recording, &folder.folder(STAGE))?;
-        return Ok(if prepared.is_nothing() { String::new() } else { own });
+        if prepared.is_nothing() {
+            return Ok(String::new());
+        }
+        watcher.say(&format!("{STAGE:<7} kept"));
+        return Ok(own);
     }
     let needs = Needs::of(recording)?;
     let start = Instant::now();
@@ -163,8 +166,11 @@ pub(crate) fn for_build(
     drop(progress);
     write_json(&at.join("prepare.json"), &prepared)?;
     folder.finish(STAGE, &own, start.elapsed().as_secs_f64())?;
+    if prepared.is_nothing() {
+        return Ok(String::new());
+    }
     watcher.say(&format!("{STAGE:<7} {:.1} s", start.elapsed().as_secs_f64()));
-    Ok(if prepared.is_nothing() { String::new() } else { own })
+    Ok(own)
 }
 
 /// Brings states in which the object as a whole stands elsewhere back to where it stood.
@@ -255,6 +261,9 @@ fn failure(e: PrepareError, recording: &Recording) -> Failure {
         }
         PrepareError::NothingMoved { .. } => {
             "move every part by more than its own thickness between scans; or give masks of the object"
+        }
+        PrepareError::NoObject { .. } => {
+            "give masks of the object: mask_path of every frame, see docs/recordings.md; was something else moved, too?"
         }
         PrepareError::NoFocus => "point the camera at the object; check poses and the unit of depth",
         PrepareError::Depths(_) => "run `hingecast check` on the recording",

@@ -14,7 +14,6 @@ use crate::error::PrepareError;
 use glam::{DMat3, DVec3, IVec3, Vec3};
 use hingecast_articulate::observe::cloud::{Cloud, gather};
 use hingecast_articulate::observe::lattice::Lattice;
-use hingecast_articulate::observe::occupancy::Occupancy;
 use hingecast_articulate::{DepthView, Depths};
 use hingecast_geom::Progress;
 use pieces::Pieces;
@@ -27,6 +26,9 @@ const CELLS: usize = 144;
 const REACH: f64 = 0.75;
 /// Pixels of a view that are looked at, about.
 const PIXELS: usize = 20_000;
+/// With less of what moved on it the object is not believed, or doubted.
+const HARDLY: f64 = 0.3;
+const MOSTLY: f64 = 0.6;
 /// Fewer samples that moved, over all states, are none.
 const FEW_MOVED: usize = 12;
 
@@ -71,17 +73,16 @@ pub(crate) struct Room {
 pub fn object_masks(depths: &mut dyn Depths, up: DVec3, seed: u64, progress: &Progress) -> Result<Masks, PrepareError> {
     let n = depths.n_states();
     let lattice = looked_at(depths)?;
-    let (mut clouds, mut spaces) = (Vec::new(), Vec::new());
+    let (mut clouds, mut witnesses) = (Vec::new(), Vec::new());
     for state in 0..n {
         progress.report(state, 2 * n, "what is there")?;
         let views = depths.views(state)?;
         let stride = views.first().map_or(1, |v| v.stride_for(PIXELS));
-        let cloud = inside(gather(&views, lattice.voxel, stride, 1), &lattice);
-        spaces.push(Occupancy::new(lattice, &cloud, &views, 1.5));
-        clouds.push(cloud);
+        clouds.push(inside(gather(&views, lattice.voxel, stride, 1), &lattice));
+        witnesses.push(changed::Witness::some(&views));
     }
-    let moved = changed::moved(&clouds, &spaces, &lattice);
-    drop(spaces);
+    let moved = changed::moved(&clouds, &witnesses, &lattice);
+    drop(witnesses);
     let room = Room { lattice, clouds, moved };
     let count: usize = room.moved.iter().flatten().filter(|m| **m).count();
     if count < FEW_MOVED {
@@ -96,7 +97,13 @@ pub fn object_masks(depths: &mut dyn Depths, up: DVec3, seed: u64, progress: &Pr
         }
     }
     let mut doubts = Vec::new();
-    let object = pieces.object(&room, &mut doubts);
+    let (object, share) = pieces.object(&room, &mut doubts);
+    if share < HARDLY {
+        return Err(PrepareError::NoObject { percent: 100.0 * share });
+    }
+    if share < MOSTLY {
+        doubts.push(format!("only {:.0} % of what moved is on the object that was found", 100.0 * share));
+    }
     let mut masks = Vec::new();
     let mut shares = Vec::new();
     for state in 0..n {

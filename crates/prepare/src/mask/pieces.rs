@@ -51,8 +51,8 @@ impl Pieces {
         }
     }
 
-    /// The pieces that moved surface is on.
-    pub fn object(&self, room: &Room, doubts: &mut Vec<String>) -> Object {
+    /// The pieces that moved surface is on, and the share of moved surface that is on them.
+    pub fn object(&self, room: &Room, doubts: &mut Vec<String>) -> (Object, f64) {
         let size = self.lattice.size;
         let index = |c: IVec3| ((c.z * size.y + c.y) * size.x + c.x) as usize;
         let coords = |i: usize| {
@@ -93,6 +93,7 @@ impl Pieces {
                 }
             }
         }
+        let all: usize = moved.iter().sum();
         moved[0] = 0;
         let most = moved.iter().copied().max().unwrap_or(0) as f64;
         let own: Vec<bool> = moved.iter().map(|m| *m > 0 && *m as f64 >= ALSO * most).collect();
@@ -104,7 +105,9 @@ impl Pieces {
         if together > 1 {
             doubts.push(format!("the object is in {together} pieces that do not touch"));
         }
-        Object { lattice: self.lattice, cells: piece.iter().map(|p| own[*p as usize]).collect() }
+        let on: usize = moved.iter().zip(&own).filter(|(_, own)| **own).map(|(m, _)| m).sum();
+        let cells = piece.iter().map(|p| own[*p as usize]).collect();
+        (Object { lattice: self.lattice, cells }, on as f64 / all.max(1) as f64)
     }
 }
 
