@@ -127,17 +127,17 @@ struct Pace {
 }
 
 impl Pace {
-    /// Whether another stretch of work begins: the first, another number of steps, or fewer done
-    /// than before.
+    /// Whether another stretch of work begins: the first, another number of steps, or far fewer done
+    /// than before (a few: threads that told of theirs out of order).
     fn begins(&mut self, done: usize, total: usize, now: f64) -> bool {
-        let other = total != self.total || done < self.last;
+        let other = total != self.total || done < self.last / 2;
         if other {
             // A first step was done just before it is told, unless it is a late one.
             let late = self.total > 0 || done > 1;
             self.from = if late { (done, now) } else { (0, 0.0) };
             self.total = total;
         }
-        self.last = done;
+        self.last = if other { done } else { done.max(self.last) };
         other
     }
 
@@ -179,6 +179,8 @@ mod tests {
         let mut pace = Pace::default();
         pace.begins(1, 5, 10.0);
         assert_eq!(pace.eta(1, 10.0), Some(40.0));
+        // Two threads, one late.
+        assert!(!pace.begins(4, 5, 40.0) && !pace.begins(3, 5, 40.1));
         // The next stretch of the same stage.
         assert!(pace.begins(0, 50, 60.0));
         assert_eq!(pace.eta(10, 80.0), Some(80.0));

@@ -193,8 +193,8 @@ fn truths_that_do_not_belong_to_the_run() {
     small_recording(d.path(), "other", "microwave", 5);
     // Unfinished: nothing to evaluate or to report.
     hingecast(d.path(), &format!("build rec -o run --to splat -q {TINY}")).done();
-    hingecast(d.path(), "eval run --truth rec.truth").refused("cannot read", "twin.json");
-    hingecast(d.path(), "report run").refused("cannot read", "twin.json");
+    hingecast(d.path(), "eval run --truth rec.truth").refused("the run is not finished", "run.json");
+    hingecast(d.path(), "report run").refused("the run is not finished", "run.json");
     hingecast(d.path(), &format!("build rec -o run -q {TINY}")).done();
     let eval = |truth: &str| hingecast(d.path(), &format!("eval run --truth {truth}"));
     eval("nowhere").refused("cannot read", "nowhere");

@@ -82,7 +82,7 @@ fn corrections_that_are_short_or_forgotten_are_said() {
     let line = format!("build rec -o run {TINY} --config mine.toml");
     let short = hingecast(dir, &line).done();
     assert!(short.stderr.contains("doubt: joint 'lid': its limits leave out state"), "{short}");
-    assert!(short.stderr.contains("with the stages kept from before"), "{short}");
+    assert!(short.stderr.contains("with the stages of earlier builds"), "{short}");
     assert_eq!((range(7), range(8).as_str()), (seen, "-10.0 .. 20.0 deg"));
     assert!(!hingecast(dir, &line).done().stderr.contains("other settings"), "the same again");
 

@@ -55,7 +55,7 @@ fn settings_of(run: &Path) -> Option<String> {
 fn took(secs: f64, all: f64) -> String {
     // Two digits or whole seconds.
     let round = |s: f64| if s < 9.95 { format!("{s:.1} s") } else { format!("{s:.0} s") };
-    if all > secs { format!("{} ({} with the stages kept from before)", round(secs), round(all)) } else { round(secs) }
+    if all > secs { format!("{} ({} with the stages of earlier builds)", round(secs), round(all)) } else { round(secs) }
 }
 
 pub fn run(session: &Session, args: &Build) -> Result<Outcome> {
@@ -96,7 +96,7 @@ mod tests {
     /// The sum of all stages was called the time of the build, also of those that were kept.
     #[test]
     fn kept_stages_are_told_apart() {
-        assert_eq!(took(9.93, 17.2), "9.9 s (17 s with the stages kept from before)");
+        assert_eq!(took(9.93, 17.2), "9.9 s (17 s with the stages of earlier builds)");
         assert_eq!(took(17.6, 17.2), "18 s");
     }
 }
