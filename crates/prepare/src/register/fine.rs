@@ -12,7 +12,7 @@ use nalgebra::{Matrix6, Vector6};
 use rayon::prelude::*;
 
 /// Rounds of all states together.
-const ROUNDS: usize = 5;
+const ROUNDS: usize = 3;
 /// Samples of a scan that are aligned.
 const SAMPLES: usize = 12_000;
 
@@ -72,36 +72,42 @@ pub(super) fn step(
     (about_centre * pose, off)
 }
 
-/// The poses of all states (frame of state 0 from each), refined together from `start`.
-pub(super) fn together(scans: &[Scan], start: Vec<Pose>, seed: u64) -> Vec<Pose> {
+/// The poses of all states (frame of state 0 from each), refined together from `start`. `order`: the
+/// states as the pairs reach them, state 0 first.
+pub(super) fn together(scans: &[Scan], start: Vec<Pose>, order: &[usize], seed: u64) -> Vec<Pose> {
     let n = scans.len();
     let own: Vec<(Vec<Vec3>, Vec<Vec3>)> = scans.iter().map(|scan| balanced::pick(&scan.fine, SAMPLES, seed)).collect();
     let voxel = scans.iter().map(|s| s.fine_voxel).fold(0.0, f32::max);
+    let aligned = |s: usize, others: &[usize], poses: &[Pose], rounds: usize| {
+        let (mut points, mut normals) = (Vec::new(), Vec::new());
+        for &r in others {
+            let (p, m) = carried(&scans[r].fine, &poses[r]);
+            points.extend(p);
+            normals.extend(m);
+        }
+        let surface = Surface::new(points, normals);
+        let (mut pose, mut scale) = (poses[s], f64::from(voxel));
+        for _ in 0..rounds {
+            let (better, [_, median]) = step(&own[s].0, &own[s].1, &surface, pose, 2.0 * voxel, scale);
+            pose = better;
+            scale = (3.0 * median).clamp(0.05 * f64::from(voxel), f64::from(voxel));
+        }
+        pose
+    };
     let mut poses = start;
-    for round in 0..ROUNDS {
-        let moved: Vec<(Vec<Vec3>, Vec<Vec3>)> =
-            scans.iter().zip(&poses).map(|(scan, pose)| carried(&scan.fine, pose)).collect();
-        // With many states a few of the others hold a scan as well as all do.
-        let others = |s: usize| (0..n).filter(move |&r| r != s).take(ALL.max(1));
+    // Each onto those before it: two states that lie well on each other would hold each other where
+    // both are off.
+    for k in 1..order.len() {
+        let before = &order[k.saturating_sub(ALL)..k];
+        poses[order[k]] = aligned(order[k], before, &poses, 12);
+    }
+    for _ in 0..ROUNDS {
         let next: Vec<Pose> = (0..n)
             .into_par_iter()
             .map(|s| {
-                if s == 0 && n == 2 {
-                    return poses[0];
-                }
-                let (mut points, mut normals) = (Vec::new(), Vec::new());
-                for r in others(s) {
-                    points.extend_from_slice(&moved[r].0);
-                    normals.extend_from_slice(&moved[r].1);
-                }
-                let surface = Surface::new(points, normals);
-                let (mut pose, mut scale) = (poses[s], if round == 0 { voxel as f64 } else { 0.5 * voxel as f64 });
-                for _ in 0..4 {
-                    let (better, [_, median]) = step(&own[s].0, &own[s].1, &surface, pose, 2.0 * voxel, scale);
-                    pose = better;
-                    scale = (3.0 * median).clamp(0.05 * voxel as f64, voxel as f64);
-                }
-                pose
+                // With many states a few of the others hold a scan as well as all do.
+                let others: Vec<usize> = (0..n).filter(|&r| r != s).take(ALL).collect();
+                if n == 2 && s == 0 { poses[0] } else { aligned(s, &others, &poses, 4) }
             })
             .collect();
         // State 0 keeps its frame.

@@ -93,9 +93,9 @@ pub fn register(
         progress.report(k, pairs.len(), "pairs of scans")?;
         found.push(pair::align(&scans[s], &scans[r], freedom, seed)?);
     }
-    let (start, used) = connect(n, &pairs, &found)?;
+    let (start, order, used) = connect(n, &pairs, &found)?;
     progress.report(0, 1, "all scans together")?;
-    let common_from_state = fine::together(&scans, start, seed);
+    let common_from_state = fine::together(&scans, start, &order, seed);
     let circle = circle(&pairs, &found, &common_from_state);
     let reports = pairs.iter().zip(&found).zip(used).map(|((&states, f), used)| PairReport {
         states,
@@ -106,11 +106,17 @@ pub fn register(
     Ok(Registration { common_from_state, pairs: reports.collect(), circle })
 }
 
-/// The tree of the best pairs (Prim 1957): poses in the frame of state 0, and which pairs it uses.
-fn connect(n: usize, pairs: &[(usize, usize)], found: &[pair::Placed]) -> Result<(Vec<Pose>, Vec<bool>), PrepareError> {
+/// The tree of the best pairs (Prim 1957): poses in the frame of state 0, the states in the order in
+/// which it reaches them, and which pairs it uses.
+fn connect(
+    n: usize,
+    pairs: &[(usize, usize)],
+    found: &[pair::Placed],
+) -> Result<(Vec<Pose>, Vec<usize>, Vec<bool>), PrepareError> {
     let mut pose: Vec<Option<Pose>> = vec![None; n];
     let mut used = vec![false; pairs.len()];
     pose[0] = Some(Pose::IDENTITY);
+    let mut order = vec![0];
     while let Some(missing) = (0..n).find(|&s| pose[s].is_none()) {
         let open = |k: &usize| pose[pairs[*k].0].is_some() != pose[pairs[*k].1].is_some();
         let sure = |k: &usize| found[*k].share >= AGREES && found[*k].second <= SECOND;
@@ -131,13 +137,19 @@ fn connect(n: usize, pairs: &[(usize, usize)], found: &[pair::Placed]) -> Result
         };
         let ((r, s), r_from_s) = (pairs[k], found[k].pose);
         match (pose[r], pose[s]) {
-            (Some(from), _) => pose[s] = Some(from * r_from_s),
-            (None, Some(from)) => pose[r] = Some(from * r_from_s.inverse()),
+            (Some(from), _) => {
+                pose[s] = Some(from * r_from_s);
+                order.push(s);
+            }
+            (None, Some(from)) => {
+                pose[r] = Some(from * r_from_s.inverse());
+                order.push(r);
+            }
             (None, None) => unreachable!("an open pair has one end placed"),
         }
         used[k] = true;
     }
-    Ok((pose.into_iter().flatten().collect(), used))
+    Ok((pose.into_iter().flatten().collect(), order, used))
 }
 
 /// How far apart the pairs by themselves and all states together are, over the pairs that agree.
