@@ -106,7 +106,15 @@ impl Pieces {
             doubts.push(format!("the object is in {together} pieces that do not touch"));
         }
         let on: usize = moved.iter().zip(&own).filter(|(_, own)| **own).map(|(m, _)| m).sum();
-        let cells = piece.iter().map(|p| own[*p as usize]).collect();
+        // Cells that few pixels hit - a door seen slantwise - go with those around them.
+        let around = |i: usize| {
+            let at = coords(i);
+            let near = (0..27).map(|k| at + IVec3::new(k % 3 - 1, k / 3 % 3 - 1, k / 9 - 1));
+            let inside = near.filter(|c| c.cmpge(IVec3::ZERO).all() && c.cmplt(size).all());
+            inside.into_iter().any(|c| own[piece[index(c)] as usize])
+        };
+        let is_own = |i: usize| own[piece[i] as usize] || (piece[i] == 0 && self.counts[i] > 0 && around(i));
+        let cells = (0..piece.len()).map(is_own).collect();
         (Object { lattice: self.lattice, cells }, on as f64 / all.max(1) as f64)
     }
 }

@@ -29,7 +29,7 @@ const FEW: usize = 200;
 /// A pair agrees when this share of the samples that can be judged does.
 const AGREES: f64 = 0.6;
 /// The second best place of a pair has at most this share of the best one's score.
-const SECOND: f64 = 0.85;
+const SECOND: f64 = 0.8;
 
 /// What may differ between the frames of two scans.
 #[derive(Clone, Copy, Debug, PartialEq)]
