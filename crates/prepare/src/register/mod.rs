@@ -93,9 +93,9 @@ pub fn register(
         progress.report(k, pairs.len(), "pairs of scans")?;
         found.push(pair::align(&scans[s], &scans[r], freedom, seed)?);
     }
-    let (start, order, used) = connect(n, &pairs, &found)?;
+    let Connected { poses, order, used } = connect(n, &pairs, &found)?;
     progress.report(0, 1, "all scans together")?;
-    let common_from_state = fine::together(&scans, start, &order, seed);
+    let common_from_state = fine::together(&scans, poses, &order, seed);
     let circle = circle(&pairs, &found, &common_from_state);
     let reports = pairs.iter().zip(&found).zip(used).map(|((&states, f), used)| PairReport {
         states,
@@ -106,13 +106,18 @@ pub fn register(
     Ok(Registration { common_from_state, pairs: reports.collect(), circle })
 }
 
-/// The tree of the best pairs (Prim 1957): poses in the frame of state 0, the states in the order in
-/// which it reaches them, and which pairs it uses.
-fn connect(
-    n: usize,
-    pairs: &[(usize, usize)],
-    found: &[pair::Placed],
-) -> Result<(Vec<Pose>, Vec<usize>, Vec<bool>), PrepareError> {
+/// All states, connected by the best pairs.
+struct Connected {
+    /// The frame of state 0 from each state's.
+    poses: Vec<Pose>,
+    /// The states in the order in which they are reached.
+    order: Vec<usize>,
+    /// Which pairs connect them.
+    used: Vec<bool>,
+}
+
+/// The tree of the best pairs (Prim 1957).
+fn connect(n: usize, pairs: &[(usize, usize)], found: &[pair::Placed]) -> Result<Connected, PrepareError> {
     let mut pose: Vec<Option<Pose>> = vec![None; n];
     let mut used = vec![false; pairs.len()];
     pose[0] = Some(Pose::IDENTITY);
@@ -149,7 +154,7 @@ fn connect(
         }
         used[k] = true;
     }
-    Ok((pose.into_iter().flatten().collect(), order, used))
+    Ok(Connected { poses: pose.into_iter().flatten().collect(), order, used })
 }
 
 /// How far apart the pairs by themselves and all states together are, over the pairs that agree.
