@@ -37,13 +37,9 @@ impl Scan {
         let fine_voxel = (hi - lo).max_element() / FINE as f32;
         let stride = views.first()?.stride_for(PIXELS);
         let inside = |cloud: Cloud| {
-            let keep: Vec<usize> = (0..cloud.points.len())
-                .filter(|&i| cloud.points[i].cmpge(lo).all() && cloud.points[i].cmple(hi).all())
-                .collect();
-            Cloud {
-                points: keep.iter().map(|&i| cloud.points[i]).collect(),
-                normals: keep.iter().map(|&i| cloud.normals[i]).collect(),
-            }
+            let within = |x: Vec3| x.cmpge(lo).all() && x.cmple(hi).all();
+            let keep: Vec<usize> = (0..cloud.points.len()).filter(|&i| within(cloud.points[i])).collect();
+            chosen(&cloud, &keep)
         };
         let fine = inside(gather(views, fine_voxel, stride, 1));
         let coarse = inside(gather(views, lattice.voxel, stride, 2));
@@ -64,6 +60,12 @@ impl Scan {
             None => Answer::Silent,
         }
     }
+}
+
+/// The samples of a cloud at these places.
+pub(crate) fn chosen(cloud: &Cloud, which: &[usize]) -> Cloud {
+    let pick = |from: &[Vec3]| which.iter().map(|&i| from[i]).collect();
+    Cloud { points: pick(&cloud.points), normals: pick(&cloud.normals) }
 }
 
 /// Box of what the views saw, without strays.

@@ -11,6 +11,7 @@ mod pixels;
 mod planes;
 
 use crate::error::PrepareError;
+use crate::scan::chosen;
 use glam::{DMat3, DVec3, IVec3, Vec3};
 use hingecast_articulate::observe::cloud::{Cloud, gather};
 use hingecast_articulate::observe::lattice::Lattice;
@@ -154,8 +155,7 @@ fn looked_at(depths: &mut dyn Depths) -> Result<Lattice, PrepareError> {
 
 fn inside(cloud: Cloud, lattice: &Lattice) -> Cloud {
     let keep: Vec<usize> = (0..cloud.points.len()).filter(|&i| lattice.index(cloud.points[i]).is_some()).collect();
-    let pick = |v: &[Vec3]| keep.iter().map(|&i| v[i]).collect();
-    Cloud { points: pick(&cloud.points), normals: pick(&cloud.normals) }
+    chosen(&cloud, &keep)
 }
 
 /// World position of pixel `i`, and of which cell; `None` without depth.

@@ -1,6 +1,7 @@
 //! Samples drawn so that all facings count alike: a floor has most of a room's surface and says
 //! least about where the room is (normal-space sampling, Rusinkiewicz and Levoy 2001).
 
+use crate::scan::chosen;
 use glam::Vec3;
 use hingecast_articulate::observe::cloud::Cloud;
 
@@ -35,14 +36,12 @@ pub(super) fn draw(cloud: &Cloud, up: Vec3, count: usize, seed: u64) -> Vec<usiz
 }
 
 /// Every so many samples of the cloud, whatever they face: as much as there is surface.
-pub(super) fn evenly(cloud: &Cloud, count: usize) -> (Vec<Vec3>, Vec<Vec3>) {
+pub(super) fn evenly(cloud: &Cloud, count: usize) -> Cloud {
     let every = cloud.points.len().div_ceil(count.max(1)).max(1);
-    let some = (0..cloud.points.len()).step_by(every);
-    (some.clone().map(|i| cloud.points[i]).collect(), some.map(|i| cloud.normals[i]).collect())
+    chosen(cloud, &(0..cloud.points.len()).step_by(every).collect::<Vec<_>>())
 }
 
-/// The samples themselves.
-pub(super) fn pick(cloud: &Cloud, count: usize, seed: u64) -> (Vec<Vec3>, Vec<Vec3>) {
-    let some = draw(cloud, Vec3::Z, count, seed);
-    (some.iter().map(|&i| cloud.points[i]).collect(), some.iter().map(|&i| cloud.normals[i]).collect())
+/// The samples that [`draw`] draws.
+pub(super) fn pick(cloud: &Cloud, count: usize, seed: u64) -> Cloud {
+    chosen(cloud, &draw(cloud, Vec3::Z, count, seed))
 }

@@ -76,7 +76,7 @@ pub(super) fn step(
 /// states as the pairs reach them, state 0 first.
 pub(super) fn together(scans: &[Scan], start: Vec<Pose>, order: &[usize], seed: u64) -> Vec<Pose> {
     let n = scans.len();
-    let own: Vec<(Vec<Vec3>, Vec<Vec3>)> = scans.iter().map(|scan| balanced::pick(&scan.fine, SAMPLES, seed)).collect();
+    let own: Vec<Cloud> = scans.iter().map(|scan| balanced::pick(&scan.fine, SAMPLES, seed)).collect();
     let voxel = scans.iter().map(|s| s.fine_voxel).fold(0.0, f32::max);
     let aligned = |s: usize, others: &[usize], poses: &[Pose], rounds: usize| {
         let (mut points, mut normals) = (Vec::new(), Vec::new());
@@ -88,7 +88,7 @@ pub(super) fn together(scans: &[Scan], start: Vec<Pose>, order: &[usize], seed: 
         let surface = Surface::new(points, normals);
         let (mut pose, mut scale) = (poses[s], f64::from(voxel));
         for _ in 0..rounds {
-            let (better, [_, median]) = step(&own[s].0, &own[s].1, &surface, pose, 2.0 * voxel, scale);
+            let (better, [_, median]) = step(&own[s].points, &own[s].normals, &surface, pose, 2.0 * voxel, scale);
             pose = better;
             scale = (3.0 * median).clamp(0.05 * f64::from(voxel), f64::from(voxel));
         }

@@ -99,14 +99,14 @@ pub(super) struct Judges {
 
 impl Judges {
     pub fn new(scan: &Scan, seed: u64) -> Self {
-        let (points, normals) = balanced::pick(&scan.coarse, JUDGES, seed);
+        let Cloud { points, normals } = balanced::pick(&scan.coarse, JUDGES, seed);
         Self { points, normals }
     }
 
     /// The same by surface: an object has no floor that drowns the rest, but thin edges that
     /// would.
     pub fn by_surface(scan: &Scan) -> Self {
-        let (points, normals) = balanced::evenly(&scan.coarse, JUDGES);
+        let Cloud { points, normals } = balanced::evenly(&scan.coarse, JUDGES);
         Self { points, normals }
     }
 

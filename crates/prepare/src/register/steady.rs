@@ -12,7 +12,6 @@ use crate::error::PrepareError;
 use crate::scan::Scan;
 use glam::DVec3;
 use hingecast_articulate::Depths;
-use hingecast_articulate::observe::cloud::Cloud;
 use hingecast_geom::icp::Surface;
 use hingecast_geom::{Pose, Progress};
 
@@ -127,8 +126,7 @@ fn placed(scan: &Scan, before: &[(&Scan, Pose)], candidates: &[Pose], seed: u64)
     let voxel = scan.fine_voxel;
     let (even, facing) = (balanced::evenly(&scan.fine, SAMPLES), balanced::pick(&scan.fine, SAMPLES, seed));
     let on = |pose: &Pose, within: f32| {
-        let cloud = Cloud { points: even.0.clone(), normals: even.1.clone() };
-        let (moved, turned) = fine::carried(&cloud, pose);
+        let (moved, turned) = fine::carried(&even, pose);
         let lies = |(x, m): &(&glam::Vec3, &glam::Vec3)| {
             let Some((j, squared)) = surface.nearest(**x) else { return false };
             let n = surface.normals[j];
@@ -140,7 +138,8 @@ fn placed(scan: &Scan, before: &[(&Scan, Pose)], candidates: &[Pose], seed: u64)
         let (mut pose, mut scale, mut noise) = (*start, 2.0 * f64::from(voxel), 0.0);
         for round in 0..ROUNDS {
             let gate = if round < ROUNDS / 3 { 4.0 } else { 2.0 };
-            let (better, [quartile, _]) = fine::step(&facing.0, &facing.1, &surface, pose, gate * voxel, scale);
+            let (better, [quartile, _]) =
+                fine::step(&facing.points, &facing.normals, &surface, pose, gate * voxel, scale);
             (pose, noise) = (better, 2.0 * quartile);
             // Half of the samples near others may be of parts that moved.
             scale = (6.0 * quartile).clamp(0.05 * f64::from(voxel), 2.0 * f64::from(voxel));
