@@ -20,6 +20,15 @@ pub enum Doubt {
         /// How many nats it is behind.
         nats: f64,
     },
+    /// The part may not move at all: views contradict its motion about as much as they contradict rest.
+    MayNotMove {
+        /// Name of the joint.
+        joint: String,
+        /// Share of the places where the part would be at rest that other states look through.
+        at_rest: f64,
+        /// The same where it is said to be, and where its own state measured it.
+        moved: f64,
+    },
     /// The axis may point elsewhere.
     LooseAxis {
         /// Name of the joint.
@@ -87,6 +96,7 @@ impl Doubt {
     pub fn about(&self) -> Option<&str> {
         match self {
             Self::Undecidable { joint, .. }
+            | Self::MayNotMove { joint, .. }
             | Self::LooseAxis { joint, .. }
             | Self::LoosePivot { joint, .. }
             | Self::MayFollow { joint, .. }
@@ -106,6 +116,7 @@ impl Doubt {
         }
         match &mut self {
             Self::Undecidable { joint, .. }
+            | Self::MayNotMove { joint, .. }
             | Self::LooseAxis { joint, .. }
             | Self::LoosePivot { joint, .. }
             | Self::MayFollow { joint, .. }
@@ -129,6 +140,14 @@ impl fmt::Display for Doubt {
                 f,
                 "undecidable: '{joint}' may as well be {}: it moved too little to tell ({nats:.1} nats apart; 10 would do)",
                 kind_name(*rival)
+            ),
+            Self::MayNotMove { joint, at_rest, moved } => write!(
+                f,
+                "joint '{joint}' may not move at all: cameras look through {:.0} % of where its part was, and through \
+                 {:.0} % of where it was measured or is said to be; scans that see different places, or cameras that \
+                 drift, look like that",
+                100.0 * at_rest,
+                100.0 * moved
             ),
             Self::LooseAxis { joint, deg } => {
                 write!(f, "joint '{joint}': the depth says where its axis points only to {deg:.1} deg")

@@ -11,11 +11,13 @@ use crate::model::estimate::{Discovery, FitReport};
 use crate::observe::depth_view::DepthView;
 use crate::observe::evidence::{Evidence, MOST_STATES};
 use crate::observe::lattice::Lattice;
+use crate::observe::witness::Witness;
 use crate::observe::{align_to_base, cameras};
 use crate::passes::driver::{PassRecord, settle};
-use crate::passes::optional_names;
+use crate::passes::known;
 use crate::pictures::information::{Information, of_parts};
 use crate::search::discover::discover;
+use crate::shown::{Shown, shown};
 use crate::weigh_doubts::weigh_doubts;
 use hingecast_geom::{Certainty, KinematicTree, Pose, Progress};
 
@@ -37,6 +39,8 @@ pub struct Articulation {
     pub information: Vec<Vec<Information>>,
     /// Of each joint, in the tree's order.
     pub certainty: Vec<Certainty>,
+    /// How views judge the motion of each joint, in the tree's order.
+    pub shown: Vec<Shown>,
     /// Gravest first.
     pub doubts: Vec<Doubt>,
     /// What every pass did, in order.
@@ -95,7 +99,7 @@ pub fn find(depths: &mut dyn Depths, config: &Config, progress: &Progress) -> Re
             let mut views = depths.views(state).map_err(ArticulateError::of_depths)?;
             check_views(&views, state)?;
             if config.align_cameras {
-                cameras::align(&mut views, lattice.voxel);
+                cameras::align(&mut views, lattice.voxel, cameras::POINTS);
             }
             cameras.push(views.iter().map(|v| v.camera.camera_from_world).collect());
             Ok(views)
@@ -134,7 +138,17 @@ pub fn find(depths: &mut dyn Depths, config: &Config, progress: &Progress) -> Re
         labels = label_clouds(&evidence, &estimate.tree, &estimate.owners);
     }
     let information = if noisy { of_parts(&evidence, &labels, &estimate) } else { Vec::new() };
-    let (doubts, certainty) = weigh_doubts(&evidence, &estimate, &labels, seed);
+    let witnesses = if estimate.tree.joints.is_empty() {
+        Vec::new()
+    } else {
+        let of_state = |state| -> Result<Vec<Witness>, ArticulateError> {
+            progress.report(state, n_states, "does it move?")?;
+            Ok(Witness::some(&corrected(depths, state, &cameras[state])?, ACROSS))
+        };
+        (0..n_states).map(of_state).collect::<Result<_, _>>()?
+    };
+    let shown = shown(&evidence, &estimate.tree, &labels, &witnesses);
+    let (doubts, certainty) = weigh_doubts(&evidence, &estimate, &labels, &shown, seed);
     let samples = if noisy || !config.borders {
         let of_state = |(state, own): (usize, &Vec<u8>)| -> Vec<Labelled> {
             let points = &evidence.clouds[state].points;
@@ -155,6 +169,7 @@ pub fn find(depths: &mut dyn Depths, config: &Config, progress: &Progress) -> Re
         report: estimate.report,
         information,
         certainty,
+        shown,
         doubts,
         trace,
     })
@@ -174,6 +189,9 @@ fn corrected(depths: &mut dyn Depths, state: usize, cameras: &[Pose]) -> Result<
     Ok(views)
 }
 
+/// Pixels across a view when it is asked whether parts move.
+const ACROSS: usize = 160;
+
 /// Cells of the grid along the object's longest side.
 const CELLS: std::ops::RangeInclusive<usize> = 8..=1000;
 
@@ -189,11 +207,7 @@ fn checked_lattice(depths: &mut dyn Depths, config: &Config) -> Result<Lattice, 
         let hint = format!("cells = {} to {}", CELLS.start(), CELLS.end());
         return Err(ArticulateError::input("a setting is out of range", format!("cells = {}", config.cells), hint));
     }
-    if let Some(name) = config.skip.iter().find(|name| optional_names().all(|known| known != **name)) {
-        let names: Vec<&str> = optional_names().collect();
-        let what = format!("no pass '{name}' that could be left out");
-        return Err(ArticulateError::input(what, "passes.skip", format!("one of {}", names.join(", "))));
-    }
+    known(&config.skip)?;
     let (lo, hi) = depths.extent().map_err(ArticulateError::of_depths)?;
     let size = hi - lo;
     if !(lo.is_finite() && hi.is_finite() && size.min_element() >= 0.0 && size.max_element() > 0.0) {

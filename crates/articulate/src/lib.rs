@@ -42,6 +42,7 @@ pub mod passes;
 pub mod pictures;
 pub mod score;
 pub mod search;
+pub mod shown;
 mod weigh_doubts;
 
 pub use config::{Config, MANY_STATES};

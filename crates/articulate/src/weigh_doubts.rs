@@ -8,6 +8,7 @@ use crate::model::motions::{poses_of, state_to_state};
 use crate::model::owners::Member;
 use crate::observe::evidence::Evidence;
 use crate::score::compare::REFUTED_NATS;
+use crate::shown::Shown;
 use glam::{IVec3, Vec3};
 use hingecast_geom::{Certainty, Joint};
 use std::collections::HashMap;
@@ -21,17 +22,21 @@ const SIGMA_OPTIMISM: f64 = 5.0;
 const PIECE_SHARE: f64 = 0.2;
 /// Pieces farther apart than one to two cells of this many voxels are separate.
 const GAP_VOXELS: f32 = 1.5;
+/// A motion is believed when no more speaks against it than this share of what speaks for it: real parts
+/// had 0.1 at most, phantoms 0.8 and more.
+const MOVES: f64 = 0.4;
 /// Share of samples that may stay unexplained silently.
 const UNEXPLAINED_SHARE: f64 = 0.005;
 /// Share of the part's samples that a state must confirm.
 const SEEN_SHARE: f64 = 0.05;
 
 /// Doubts, gravest first, and how sure one may be of each joint. `clouds`: the part of every point
-/// of every state's cloud.
+/// of every state's cloud; `shown`: how views judge each joint.
 pub fn weigh_doubts(
     evidence: &Evidence,
     found: &Estimate,
     clouds: &[Vec<u8>],
+    shown: &[Shown],
     seed: u64,
 ) -> (Vec<Doubt>, Vec<Certainty>) {
     let (mut out, mut certainty) = (Vec::new(), Vec::new());
@@ -41,6 +46,10 @@ pub fn weigh_doubts(
     }
     for (j, joint) in tree.joints.iter().enumerate() {
         let name = || joint.name.clone();
+        let Shown { at_rest, moved, own, .. } = shown[j];
+        if shown[j].against() > MOVES {
+            out.push(Doubt::MayNotMove { joint: name(), at_rest, moved: moved.max(own) });
+        }
         let members = found.owners.members(evidence, joint.child);
         let (rival, nats) = rival(evidence, tree, j, &members, seed);
         let rival = rival.joints[j].screw.kind;

@@ -141,11 +141,11 @@ fn build_with(
     let path = run.join("config.toml");
     hingecast_geom::staging::write_whole(&path, text.as_bytes()).map_err(Failure::io(&path))?;
 
-    let prepared = crate::prepare::for_build(&mut recording, &mut folder, config.seed, watcher)?;
+    let (prepared, doubts) = crate::prepare::for_build(&mut recording, &mut folder, config.seed, watcher)?;
     let cache = ViewCache::new(&recording, config.memory_mb << 20);
     let background = targets::background(&recording, &cache)?;
     let mut inputs =
-        Inputs { recording: &recording, cache: &cache, config, threads, background, cameras: BTreeMap::new() };
+        Inputs { recording: &recording, cache: &cache, config, threads, background, cameras: BTreeMap::new(), doubts };
     let mut made = Made::new(run.to_path_buf());
     let all = Stage::all(config.method);
     let stamps = stamps(config, &format!("{}{prepared}", folder.record.fingerprint));

@@ -146,7 +146,7 @@ impl Config {
         // Positive means above this: a voxel of nothing would fill any memory.
         let (finest, coarsest) = (1.0 / 2048.0, 0.2);
         let checks = [
-            ("memory_mb", self.memory_mb as f64, from(1), "MB"),
+            ("memory_mb", self.memory_mb as f64, (1.0, 1e9), "MB"),
             ("fit.gaussians", self.fit.gaussians as f64, (100.0, 1e7), "a number"),
             ("fit.steps", self.fit.steps as f64, from(1), "steps"),
             ("screw.cells", self.screw.cells as f64, (24.0, 400.0), "cells"),
@@ -154,6 +154,8 @@ impl Config {
             ("track.steps", self.track.steps as f64, from(1), "steps per state"),
             ("track.rate[0]", self.track.rate[0] as f64, share, "share of the diagonal"),
             ("track.rate[1]", self.track.rate[1] as f64, share, "share of the diagonal"),
+            ("track.quat_rate", self.track.quat_rate.into(), share, "radians or so a step"),
+            ("track.depth", self.track.depth.into(), from(0), "weight"),
             ("parts.parts", self.parts.parts as f64, (0.0, 250.0), "a number, 0 = find out"),
             ("parts.max_parts", self.parts.max_parts as f64, (1.0, 250.0), "a number"),
             ("parts.sample", self.parts.sample as f64, (50.0, 20_000.0), "gaussians"),
@@ -170,7 +172,7 @@ impl Config {
             ("twin.crumbs", self.twin.crumbs, share, "share of the largest piece"),
         ];
         match checks.into_iter().find(|(_, value, (lo, hi), _)| !(value >= lo && value <= hi)) {
-            None => Ok(()),
+            None => Ok(hingecast_articulate::passes::known(&self.passes.skip)?),
             Some((key, value, (lo, hi), unit)) => {
                 let range = if hi.is_finite() { format!("{lo} to {hi}") } else { format!("{lo} or more") };
                 let hint = format!("{key} = {range} ({unit})");

@@ -163,10 +163,24 @@ fn one(file: &mut Joints, entry: &JointOverride, size: &Extent) -> std::result::
         joint.limits = [lo * unit, hi * unit];
     }
     if let Some(name) = &entry.name {
+        may_be_called(name, j, &file.tree)?;
+        let joint = &mut file.tree.joints[j];
         file.doubts = std::mem::take(&mut file.doubts).into_iter().map(|d| d.renamed(&joint.name, name)).collect();
         joint.name.clone_from(name);
     }
     Ok(())
+}
+
+/// Names go into URDF and MJCF, where another joint's, an empty one or one with control characters makes a
+/// model that nobody loads.
+fn may_be_called(name: &str, j: usize, tree: &KinematicTree) -> std::result::Result<(), (String, String)> {
+    if name.trim().is_empty() || name.chars().any(char::is_control) {
+        return Err((format!("no name for a joint: {name:?}"), "name = letters, digits, _ and -".to_string()));
+    }
+    match tree.joints.iter().enumerate().any(|(k, other)| k != j && other.name == name) {
+        true => Err((format!("two joints called '{name}'"), "name = one that no other joint has".to_string())),
+        false => Ok(()),
+    }
 }
 
 #[cfg(test)]

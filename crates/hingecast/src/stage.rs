@@ -77,6 +77,11 @@ impl RunFolder {
             return Ok(());
         }
         let hint = "give a new folder: hingecast build RECORDING -o RUN";
+        let damaged = root.join("run.json");
+        if damaged.is_file() {
+            let hint = "put the file back, or give a new folder";
+            return Err(Failure::new("not a run's: run.json is damaged", damaged.display().to_string(), hint));
+        }
         Err(Failure::new("the run folder holds something else", root.display().to_string(), hint))
     }
 
@@ -184,6 +189,12 @@ impl RunFolder {
     /// Whether `stage` is done, with whatever stamp.
     pub fn has(&self, stage: &str) -> bool {
         self.record.stages.iter().any(|s| s.name == stage)
+    }
+
+    /// Whether all that `stage` left, with whatever stamp, is there and unchanged.
+    pub fn is_whole(&self, stage: &str) -> bool {
+        let done = self.record.stages.iter().find(|s| s.name == stage);
+        done.is_some_and(|s| unchanged(&self.folder(stage), &s.files))
     }
 
     /// Drops the stage and all later ones from the record; then empties its folder, unless that

@@ -2,6 +2,7 @@
 //! the search for parts needs: one frame for all states, and the object alone.
 //!
 //! ```text
+//! settle      the views of each scan among themselves, where tracking drifted
 //! register    the states' frames, brought together on what stands still: pairs of scans globally, all together finely
 //! mask        the object without masks: what moves, and what that hangs on
 //! ```
@@ -15,8 +16,10 @@ mod error;
 pub mod mask;
 pub mod register;
 mod scan;
+mod settle;
 
 pub use error::PrepareError;
 pub use mask::{MaskReport, Masks, object_masks};
 pub use register::{Registration, register, steady};
 pub use scan::Scan;
+pub use settle::settle;

@@ -69,7 +69,7 @@ pub(crate) fn chosen(cloud: &Cloud, which: &[usize]) -> Cloud {
 }
 
 /// Box of what the views saw, without strays.
-fn extent(views: &[DepthView], around: f32) -> Option<(Vec3, Vec3)> {
+pub(crate) fn extent(views: &[DepthView], around: f32) -> Option<(Vec3, Vec3)> {
     let mut axes: [Vec<f32>; 3] = Default::default();
     for view in views {
         let (w, stride) = (view.camera.width, 7);
@@ -90,6 +90,7 @@ fn extent(views: &[DepthView], around: f32) -> Option<(Vec3, Vec3)> {
     };
     let lo = Vec3::from_array(std::array::from_fn(|a| at(&mut axes[a], STRAY)));
     let hi = Vec3::from_array(std::array::from_fn(|a| at(&mut axes[a], 1.0 - STRAY)));
-    let room = around * (hi - lo).max_element();
-    (room > 0.0).then_some((lo - Vec3::splat(room), hi + Vec3::splat(room)))
+    let side = (hi - lo).max_element();
+    let room = Vec3::splat(around * side);
+    (side > 0.0).then_some((lo - room, hi + room))
 }

@@ -17,8 +17,8 @@ use rayon::prelude::*;
 
 /// Rounds of aligning and gathering.
 const ROUNDS: usize = 7;
-/// Points per view.
-const POINTS: usize = 1200;
+/// Points per view that hold an object's cameras.
+pub const POINTS: usize = 1200;
 /// Fewer points hold no camera.
 const FEW: usize = 60;
 /// Pull towards the recorded pose, share of the pull towards the surface. Front and back of a box
@@ -27,12 +27,14 @@ const TETHER: f64 = 0.01;
 /// Below this share of a voxel the views agree already.
 const SHARP: f32 = 0.04;
 
-/// Corrects the cameras of one state's views in place; leaves them alone where they agree already.
-pub fn align(views: &mut [DepthView], voxel: f32) {
+/// Corrects the cameras of one state's views in place, by about `count` points of each; leaves them
+/// alone where they agree already. `voxel`: edge of the cells that views are compared in, scene units;
+/// a cell should hold points of several views.
+pub fn align(views: &mut [DepthView], voxel: f32, count: usize) {
     let planes: Vec<Vec<(Vec3, Vec3)>> = views
         .par_iter()
         .map(|view| {
-            let stride = view.stride_for(POINTS);
+            let stride = view.stride_for(count);
             let mut out = Vec::new();
             view.planes(stride, &mut |x, n, _| out.push((x, n)));
             out

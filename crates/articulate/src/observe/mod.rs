@@ -10,3 +10,4 @@ pub mod lattice;
 pub mod occupancy;
 pub mod robust;
 pub mod sample;
+pub mod witness;

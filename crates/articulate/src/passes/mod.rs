@@ -17,6 +17,7 @@ pub mod two_values;
 pub mod value_search;
 pub mod visibility;
 
+use crate::error::ArticulateError;
 use crate::model::estimate::Estimate;
 use pass::{Pass, Round};
 
@@ -68,4 +69,19 @@ pub fn schedule() -> impl Iterator<Item = (usize, &'static Pass)> {
 /// Names that `passes.skip` takes.
 pub fn optional_names() -> impl Iterator<Item = &'static str> {
     [FIRST, ROUND, LAST].into_iter().flatten().filter(|p| p.optional).map(|p| p.name)
+}
+
+/// Whether all `names` are those of passes that can be left out.
+///
+/// # Errors
+/// One is not, by name.
+pub fn known(names: &[String]) -> Result<(), ArticulateError> {
+    match names.iter().find(|name| optional_names().all(|known| known != **name)) {
+        None => Ok(()),
+        Some(name) => {
+            let all: Vec<&str> = optional_names().collect();
+            let what = format!("no pass '{name}' that could be left out");
+            Err(ArticulateError::input(what, "passes.skip", format!("one of {}", all.join(", "))))
+        }
+    }
 }

@@ -174,6 +174,7 @@ pub fn import<P: AsRef<Path>>(
     config: &Config,
     progress: &Progress,
 ) -> Result<ImportReport, CaptureError> {
+    not_a_source(sources, out)?;
     crate::synth::may_be_replaced(out)?;
     let mut scratch = Scratch::new(out);
     // Sources and where they are read: zip files are unpacked.
@@ -184,6 +185,20 @@ pub fn import<P: AsRef<Path>>(
         }
         e
     })
+}
+
+/// What is written takes the place of what was there: never that of a source, or of a folder with one
+/// in it.
+fn not_a_source<P: AsRef<Path>>(sources: &[P], out: &Path) -> Result<(), CaptureError> {
+    let Ok(out) = out.canonicalize() else { return Ok(()) };
+    let is_there = |src: &&Path| src.canonicalize().is_ok_and(|src| src.starts_with(&out));
+    match sources.iter().map(P::as_ref).find(is_there) {
+        None => Ok(()),
+        Some(src) => {
+            let what = format!("the output would take the place of a source: {}", src.display());
+            Err(CaptureError::new(what, out.display().to_string(), "another folder: -o RECORDING"))
+        }
+    }
 }
 
 fn convert<P: AsRef<Path>>(

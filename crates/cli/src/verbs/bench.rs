@@ -2,6 +2,7 @@
 
 use super::{Outcome, Session, build, synth, table};
 use crate::cli::Bench;
+use hingecast::config::{Config, Method};
 use hingecast::eval::parts::PartsEvaluation;
 use hingecast::eval::{Evaluation, evaluate};
 use hingecast::failure::{Failure, Result};
@@ -17,13 +18,22 @@ use std::path::Path;
 
 pub fn run(session: &Session, args: &Bench) -> Result<Outcome> {
     let suite = objects(&args.suite)?;
+    let settings = build::config(&args.build)?;
+    if !args.joints && (!args.protocols.is_empty() || args.seeds != 1) {
+        let hint = "add --joints, or leave --protocol and --seeds out";
+        return Err(Failure::new("protocols and seeds are for the bench of joints", "--protocol / --seeds", hint));
+    }
+    if args.joints && settings.method == Method::Track {
+        let what = "the bench of joints knows the method screw alone";
+        return Err(Failure::new(what, "--method track", "leave --joints out, or --method"));
+    }
     claim(&args.out, if args.joints { "joints.json" } else { "bench.json" })?;
     if args.joints {
-        return joints(session, args, &suite);
+        return joints(session, args, &suite, &settings);
     }
     let synth_config = synth::config(&args.synth, args.recording_seed, true)?;
-    let build_config = build::config(&args.build)?;
-    let before: Option<Vec<Evaluation>> = args.against.as_deref().map(read_json).transpose()?;
+    let build_config = settings;
+    let before: Option<Vec<Evaluation>> = args.against.as_deref().map(earlier).transpose()?;
     let mut evaluations: Vec<Evaluation> = Vec::new();
     for Named { argument, name } in &suite {
         session.ui.say(&format!("== {name}"));
@@ -58,15 +68,23 @@ pub fn run(session: &Session, args: &Bench) -> Result<Outcome> {
     Ok(outcome)
 }
 
+/// The table of an earlier bench.
+fn earlier(file: &Path) -> Result<Vec<Evaluation>> {
+    let hint = "give the bench.json of an earlier bench";
+    let text = std::fs::read(file).map_err(|e| Failure::new(e.to_string(), file.display().to_string(), hint))?;
+    serde_json::from_slice(&text)
+        .map_err(|e| Failure::new(format!("not a table of a bench: {e}"), file.display().to_string(), hint))
+}
+
 /// Parts and joints alone, in a grid of protocols and seeds.
-fn joints(session: &Session, args: &Bench, suite: &[Named]) -> Result<Outcome> {
+fn joints(session: &Session, args: &Bench, suite: &[Named], settings: &Config) -> Result<Outcome> {
     let request = Request {
         suite,
         protocols: &args.protocols,
         seeds: args.seeds,
         first_seed: args.recording_seed,
         synth: &synth::config(&args.synth, args.recording_seed, true)?,
-        build: &build::config(&args.build)?,
+        build: settings,
         out: &args.out,
         tidy: args.tidy,
     };
@@ -105,7 +123,7 @@ fn one(
     recording: &Path,
     run: &Path,
     synth_config: &SynthConfig,
-    build_config: &hingecast::config::Config,
+    build_config: &Config,
 ) -> Result<Evaluation> {
     record_once(&session.host(), argument, synth_config, recording)?;
     RunFolder::may_become_run(run)?;

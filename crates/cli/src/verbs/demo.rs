@@ -4,7 +4,7 @@ use super::{Outcome, Session, table};
 use crate::cli::Demo;
 use hingecast::config::{Config, Preset};
 use hingecast::eval::evaluate;
-use hingecast::failure::Result;
+use hingecast::failure::{Failure, Result};
 use hingecast::report;
 use hingecast::stage::RunFolder;
 use hingecast_capture::Truth;
@@ -15,6 +15,11 @@ use std::path::Path;
 pub fn run(session: &Session, args: &Demo) -> Result<Outcome> {
     let out = args.out.clone().unwrap_or_else(|| Path::new("runs/demo").join(name_of(&args.object)));
     let (recording, run) = (out.join("recording"), out.join("run"));
+    let entries = || std::fs::read_dir(&out).into_iter().flatten().flatten();
+    if entries().any(|e| !["recording", "recording.truth", "run"].iter().any(|name| e.file_name() == *name)) {
+        let hint = "give a new folder: hingecast demo OBJECT -o FOLDER";
+        return Err(Failure::new("the demo's folder holds something else", out.display().to_string(), hint));
+    }
     RunFolder::may_become_run(&run)?;
     if !recording.join("transforms.json").exists() {
         let config = SynthConfig { views: 30, size: 192, ..Default::default() };

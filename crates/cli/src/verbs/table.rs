@@ -53,6 +53,10 @@ pub fn detail(e: &Evaluation) -> String {
          sampling alone gives; docs/metrics.md defines them)"
     );
     for (name, p) in [("first state", &e.first_state), ("other states", &e.other_states)] {
+        if p.pictures == 0 {
+            let _ = writeln!(out, "{name:<13} no held-out pictures");
+            continue;
+        }
         let _ = writeln!(
             out,
             "{name:<13} {} held-out pictures: PSNR {:.2} dB, SSIM {:.4}, depth MAE {:.5} ({:.3} % of diagonal), mask IoU {:.4}, part mIoU {:.4}",

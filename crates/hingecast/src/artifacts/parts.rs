@@ -6,6 +6,7 @@ use crate::failure::Result;
 use crate::stage::{read_json, write_json};
 use glam::Vec3;
 use hingecast_articulate::model::estimate::FitReport;
+use hingecast_articulate::shown::Shown;
 use hingecast_articulate::{Articulation, Doubt, Information, PassRecord};
 use hingecast_geom::{Certainty, KinematicTree, Pose};
 use serde::{Deserialize, Serialize};
@@ -34,6 +35,9 @@ pub struct Parts {
     pub hi: [f32; 3],
     /// Spacing of the labelled samples, scene units.
     pub voxel: f32,
+    /// How views judge the motion of each joint.
+    #[serde(default)]
+    pub shown: Vec<Shown>,
     /// The doubts again, as data.
     #[serde(default)]
     pub doubted: Vec<Doubt>,
@@ -53,6 +57,7 @@ impl Parts {
             doubts: found.doubts.iter().map(Doubt::to_string).collect(),
             lo: extent.0.into(),
             hi: extent.1.into(),
+            shown: found.shown.clone(),
             doubted: found.doubts.clone(),
         }
     }

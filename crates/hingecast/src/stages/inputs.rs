@@ -25,6 +25,8 @@ pub struct Inputs<'a> {
     pub background: ([f32; 3], bool),
     /// camera_from_world where the depth corrected it, by frame.
     pub cameras: BTreeMap<usize, Pose>,
+    /// Doubts about what was done to the recording before the stages.
+    pub doubts: Vec<String>,
 }
 
 impl Inputs<'_> {

@@ -55,7 +55,8 @@ pub fn run(
         up: recording.up,
     };
     let mut twin = twin::build::<Failure>(&input, &|i| seen.get(i), &inputs.config.twin, progress)?;
-    let mut doubts: Vec<String> = joints.doubts.iter().map(ToString::to_string).collect();
+    let found = joints.doubts.iter().map(ToString::to_string);
+    let mut doubts: Vec<String> = found.chain(inputs.doubts.iter().cloned()).collect();
     doubts.append(&mut twin.doubts);
     twin.doubts.clone_from(&doubts);
     twin.certainty.clone_from(&joints.certainty);

@@ -146,6 +146,6 @@ impl TrainConfig {
             let what = format!("seq_length = {} with net.rnn_layers = 0", self.seq_length);
             return refuse(what, "a network without memory sees one step: seq_length = 1");
         }
-        self.net.check().or_else(|what| refuse(format!("net.{what}"), "see config.toml of any policy for all settings"))
+        self.net.check().or_else(|what| refuse(format!("net.{what}"), "see train.toml of any policy for all settings"))
     }
 }

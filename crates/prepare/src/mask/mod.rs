@@ -15,6 +15,7 @@ use crate::scan::chosen;
 use glam::{DMat3, DVec3, IVec3, Vec3};
 use hingecast_articulate::observe::cloud::{Cloud, gather};
 use hingecast_articulate::observe::lattice::Lattice;
+use hingecast_articulate::observe::witness::Witness;
 use hingecast_articulate::{DepthView, Depths};
 use hingecast_geom::Progress;
 use pieces::Pieces;
@@ -27,6 +28,8 @@ const CELLS: usize = 144;
 const REACH: f64 = 0.75;
 /// Pixels of a view that are looked at, about.
 const PIXELS: usize = 20_000;
+/// Pixels across a view when it is asked what it looked through.
+const ACROSS: usize = 320;
 /// With less of what moved on it the object is not believed, or doubted.
 const HARDLY: f64 = 0.3;
 const MOSTLY: f64 = 0.6;
@@ -80,7 +83,7 @@ pub fn object_masks(depths: &mut dyn Depths, up: DVec3, seed: u64, progress: &Pr
         let views = depths.views(state)?;
         let stride = views.first().map_or(1, |v| v.stride_for(PIXELS));
         clouds.push(inside(gather(&views, lattice.voxel, stride, 1), &lattice));
-        witnesses.push(changed::Witness::some(&views));
+        witnesses.push(Witness::some(&views, ACROSS));
     }
     let moved = changed::moved(&clouds, &witnesses, &lattice);
     drop(witnesses);
@@ -89,13 +92,12 @@ pub fn object_masks(depths: &mut dyn Depths, up: DVec3, seed: u64, progress: &Pr
     if count < FEW_MOVED {
         return Err(PrepareError::NothingMoved { samples: count });
     }
-    let supports = planes::supports(&room, up.as_vec3(), seed);
+    let mut supports = planes::supports(&room, up.as_vec3(), seed);
+    planes::widen(&mut supports, &depths.views(0)?, lattice.voxel);
     let mut pieces = Pieces::new(lattice);
     for state in 0..n {
         progress.report(n + state, 2 * n, "what moves")?;
-        for view in depths.views(state)? {
-            pieces.add(&view, &supports);
-        }
+        pieces.add(&depths.views(state)?, &supports);
     }
     let mut doubts = Vec::new();
     let (object, share) = pieces.object(&room, &mut doubts);

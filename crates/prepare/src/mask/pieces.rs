@@ -5,9 +5,16 @@ use super::{Room, cell, place};
 use glam::{IVec3, Vec3};
 use hingecast_articulate::DepthView;
 use hingecast_articulate::observe::lattice::Lattice;
+use hingecast_articulate::observe::witness::{Witness, counted};
+use rayon::prelude::*;
+use std::collections::BTreeMap;
 
 /// Pixels, over all views and states, that make a cell count.
 const PIXELS: u16 = 3;
+/// Of the views that look at a cell close to a wall, the share whose pixels must lie in it, and how close
+/// that is, tolerances of the wall.
+const SEEN: f64 = 0.25;
+const CLOSE: f32 = 4.0;
 /// Cells farther apart than this, along an axis, do not touch.
 const TOUCH: i32 = 2;
 /// Pieces with at least this share of the moved samples of the largest belong to the object.
@@ -34,20 +41,41 @@ impl Pieces {
         Self { lattice, counts: vec![0; lattice.len()] }
     }
 
-    /// Counts the pixels of a view; not those between two surfaces, which time-of-flight cameras
-    /// make.
-    pub fn add(&mut self, view: &DepthView, supports: &[Plane]) {
-        let world_from_camera = view.camera.camera_from_world.inverse();
-        let (rot, trans) = (world_from_camera.mat3().as_mat3(), world_from_camera.trans.as_vec3());
-        let w = view.camera.width;
-        for i in 0..view.depth.len() {
-            let Some(x) = place(view, &rot, trans, i).filter(|_| !flies(view, i, w)) else { continue };
-            if supports.iter().any(|p| p.holds(x)) {
-                continue;
+    /// Counts the pixels of a state's views in cells that most of its views see surface in; not
+    /// those between two surfaces, which time-of-flight cameras make.
+    pub fn add(&mut self, views: &[DepthView], supports: &[Plane]) {
+        let witnesses = Witness::some(views, super::ACROSS);
+        // Pixels, and the witnesses whose pixels these are.
+        let mut own: BTreeMap<usize, (u16, u32)> = BTreeMap::new();
+        for (k, view) in views.iter().enumerate() {
+            let world_from_camera = view.camera.camera_from_world.inverse();
+            let (rot, trans) = (world_from_camera.mat3().as_mat3(), world_from_camera.trans.as_vec3());
+            let witness = Witness::which(k, views.len()).map_or(0, |bit| 1 << bit);
+            for i in 0..view.depth.len() {
+                let Some(x) = place(view, &rot, trans, i).filter(|_| !flies(view, i, view.camera.width)) else {
+                    continue;
+                };
+                if supports.iter().any(|p| p.holds(x, view.depth[i])) {
+                    continue;
+                }
+                if let Some(c) = self.lattice.index(x) {
+                    let (count, seen_by) = own.entry(c).or_default();
+                    (*count, *seen_by) = (count.saturating_add(1), *seen_by | witness);
+                }
             }
-            if let Some(c) = self.lattice.index(x) {
-                self.counts[c] = self.counts[c].saturating_add(1);
-            }
+        }
+        let (size, voxel) = (self.lattice.size, self.lattice.voxel);
+        let believed = own.into_par_iter().filter(|(c, (_, seen_by))| {
+            let k = *c as i32;
+            let at = IVec3::new(k % size.x, k / size.x % size.y, k / (size.x * size.y)).as_vec3();
+            let middle = self.lattice.lo + (at + 0.5) * voxel;
+            let (through, on) = counted(&witnesses, middle, voxel);
+            // What one camera alone has a little in front of a wall is a camera's error.
+            let seen = f64::from(seen_by.count_ones()) >= SEEN * (on + through) as f64;
+            on >= through && (seen || supports.iter().all(|p| p.height(middle) > CLOSE * p.widest()))
+        });
+        for (c, (count, _)) in believed.collect::<Vec<_>>() {
+            self.counts[c] = self.counts[c].saturating_add(count);
         }
     }
 

@@ -24,7 +24,7 @@ fn mask(view: &DepthView, object: &Object, supports: &[Plane]) -> Vec<u8> {
     let (w, h) = (view.camera.width, view.camera.height);
     let is_object = |i: usize| {
         let x = place(view, &rot, trans, i)?;
-        Some(object.has(x) && !supports.iter().any(|p| p.holds(x)))
+        Some(object.has(x) && !supports.iter().any(|p| p.holds(x, view.depth[i])))
     };
     let known: Vec<Option<bool>> = (0..w * h).map(is_object).collect();
     // Where depth is missing, the neighbours decide.

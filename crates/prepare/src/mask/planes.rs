@@ -1,8 +1,10 @@
 //! Floor, table, wall: large flat surfaces with everything that moves on one side of them.
 
-use super::Room;
+use super::{Room, place};
 use glam::{DMat3, DVec3, Vec3};
+use hingecast_articulate::DepthView;
 use nalgebra::Matrix3;
+use std::collections::BTreeMap;
 
 /// Planes that are sought.
 const MOST: usize = 8;
@@ -19,15 +21,22 @@ const DEEP: f32 = 1.5;
 /// what is seen along both of its directions.
 const LARGER: f32 = 1.5;
 const COVERS: f32 = 0.5;
+/// Every so many pixels say how far from a plane its pixels lie: those within so many voxels, and
+/// not fewer than these.
+const EVERY: usize = 13;
+const NEAR: f32 = 2.5;
+const FEW: usize = 50;
 
 /// A flat surface: `normal . x = offset`.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Debug)]
 pub(crate) struct Plane {
     /// Unit, towards the cameras.
     pub normal: Vec3,
     pub offset: f32,
     /// Farther than this from it is something else, scene units.
     pub tolerance: f32,
+    /// The same for pixels whose z is in one of these bins.
+    pub at_distance: BTreeMap<i32, f32>,
 }
 
 impl Plane {
@@ -36,10 +45,21 @@ impl Plane {
         self.normal.dot(x) - self.offset
     }
 
-    /// Whether a place belongs to it: on it, or behind it.
-    pub fn holds(&self, x: Vec3) -> bool {
-        self.height(x) < self.tolerance
+    /// The farthest from it that any of its pixels may be.
+    pub fn widest(&self) -> f32 {
+        self.at_distance.values().copied().fold(self.tolerance, f32::max)
     }
+
+    /// Whether a place that was measured at `z` belongs to it: on it, or behind it.
+    pub fn holds(&self, x: Vec3, z: f32) -> bool {
+        let tolerance = self.at_distance.get(&bin(z)).copied().unwrap_or(self.tolerance);
+        self.height(x) < tolerance.max(self.tolerance)
+    }
+}
+
+/// Bins of z: stereo cameras' errors grow with its square.
+fn bin(z: f32) -> i32 {
+    (z.max(1e-6).ln() / 0.2).floor() as i32
 }
 
 /// The planes of the room.
@@ -103,11 +123,37 @@ fn largest(samples: &[(Vec3, Vec3)], voxel: f32, rng: &mut fastrand::Rng) -> Opt
         (normal, offset) = fitted(own.iter().map(|&i| samples[i].0), normal);
     }
     let own = members(normal, offset, 1.5 * voxel);
-    let mut off: Vec<f32> = own.iter().map(|&i| (normal.dot(samples[i].0) - offset).abs()).collect();
+    let off = own.iter().map(|&i| (normal.dot(samples[i].0) - offset).abs()).collect();
+    Some((Plane { normal, offset, tolerance: tolerance(off, voxel), at_distance: BTreeMap::new() }, own))
+}
+
+/// How far from a plane its own samples may lie, when these are `off`.
+fn tolerance(mut off: Vec<f32>, voxel: f32) -> f32 {
     let middle = off.len() / 2;
     let median = *off.select_nth_unstable_by(middle, f32::total_cmp).1;
-    let tolerance = (5.0 * median).clamp(0.3 * voxel, 1.5 * voxel);
-    Some((Plane { normal, offset, tolerance }, own))
+    (5.0 * median).clamp(0.3 * voxel, 1.5 * voxel)
+}
+
+/// Widens the planes to what single pixels are off: samples are means of many.
+pub(super) fn widen(supports: &mut [Plane], views: &[DepthView], voxel: f32) {
+    let mut off: Vec<BTreeMap<i32, Vec<f32>>> = vec![BTreeMap::new(); supports.len()];
+    for view in views {
+        let world_from_camera = view.camera.camera_from_world.inverse();
+        let (rot, trans) = (world_from_camera.mat3().as_mat3(), world_from_camera.trans.as_vec3());
+        for i in (0..view.depth.len()).step_by(EVERY) {
+            let Some(x) = place(view, &rot, trans, i) else { continue };
+            for (plane, off) in supports.iter().zip(&mut off) {
+                let height = plane.height(x).abs();
+                if height < NEAR * voxel {
+                    off.entry(bin(view.depth[i])).or_default().push(height);
+                }
+            }
+        }
+    }
+    for (plane, off) in supports.iter_mut().zip(off) {
+        let enough = off.into_iter().filter(|(_, off)| off.len() >= FEW);
+        plane.at_distance = enough.map(|(bin, off)| (bin, tolerance(off, voxel))).collect();
+    }
 }
 
 /// Total least squares; the normal on the side of `towards`.

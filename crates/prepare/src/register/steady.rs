@@ -3,14 +3,16 @@
 //!
 //! A small motion is looked for, and it must be earned: a state stays as it was recorded unless
 //! another place explains clearly more of all states before it. A door that moved is no push: the
-//! states before contradict each other about it, or it is smaller than what stood still.
+//! states before contradict each other about it, or it is smaller than what stood still. And what is
+//! pushed stays upright: the lid of a laptop that opens from shut is most of what is seen of it, and
+//! no push.
 
 use super::pair::{Judges, farthest, refined, score, upright, voters};
 use super::votes::places;
 use super::{balanced, fine};
 use crate::error::PrepareError;
 use crate::scan::Scan;
-use glam::DVec3;
+use glam::{DVec3, Vec3};
 use hingecast_articulate::Depths;
 use hingecast_geom::icp::Surface;
 use hingecast_geom::{Pose, Progress};
@@ -23,10 +25,18 @@ const COMPARED: usize = 4;
 /// Largest push: turn, radians, and shift, shares of the scan's longest side.
 const TURN: f64 = 0.25;
 const SHIFT: f64 = 0.2;
+/// What is pushed stays on its floor: largest tilt, radians, and rise, shares of the longest side.
+const TILT: f64 = 0.03;
+const RISE: f64 = 0.02;
 /// A push is believed when it explains so many times what the recorded place does.
 const EARNED: f64 = 1.25;
 /// The same for a place that is found from the recorded one.
 const EARNED_FINELY: f64 = 1.15;
+/// Of the surface that a push would have moved by so many tolerances along its normals, at most this
+/// share may stand where it stood. Drawers pulled out together look like a cupboard that was pushed,
+/// but its frame has stayed.
+const CLEARLY: f64 = 2.5;
+const STANDS: f64 = 0.1;
 /// Within so many fine voxels of a plane, or three times the noise, a sample lies on it.
 const ON: f32 = 0.25;
 /// Places that are settled finely, and the rounds of that.
@@ -61,7 +71,7 @@ pub fn steady(depths: &mut dyn Depths, up: DVec3, seed: u64, progress: &Progress
         }
         let known: Vec<Pose> = out[..s].to_vec();
         let candidates = candidates(scan, &before, &known, up, seed);
-        out[s] = placed(scan, &before, &candidates, seed);
+        out[s] = placed(scan, &before, &candidates, up, seed);
     }
     Ok(out)
 }
@@ -115,7 +125,7 @@ fn candidates(scan: &Scan, before: &[(&Scan, Pose)], known: &[Pose], up: DVec3, 
 
 /// The place at which most samples lie exactly on those of the states before; the recorded one unless
 /// another is clearly better.
-fn placed(scan: &Scan, before: &[(&Scan, Pose)], candidates: &[Pose], seed: u64) -> Pose {
+fn placed(scan: &Scan, before: &[(&Scan, Pose)], candidates: &[Pose], up: DVec3, seed: u64) -> Pose {
     let (mut points, mut normals) = (Vec::new(), Vec::new());
     for (other, pose) in before {
         let (p, n) = fine::carried(&other.fine, pose);
@@ -125,14 +135,14 @@ fn placed(scan: &Scan, before: &[(&Scan, Pose)], candidates: &[Pose], seed: u64)
     let surface = Surface::new(points, normals);
     let voxel = scan.fine_voxel;
     let (even, facing) = (balanced::evenly(&scan.fine, SAMPLES), balanced::pick(&scan.fine, SAMPLES, seed));
-    let on = |pose: &Pose, within: f32| {
+    let on = |pose: &Pose, within: f32| -> Vec<bool> {
         let (moved, turned) = fine::carried(&even, pose);
-        let lies = |(x, m): &(&glam::Vec3, &glam::Vec3)| {
-            let Some((j, squared)) = surface.nearest(**x) else { return false };
+        let lies = |(x, m): (&Vec3, &Vec3)| {
+            let Some((j, squared)) = surface.nearest(*x) else { return false };
             let n = surface.normals[j];
-            squared < (2.0 * voxel).powi(2) && m.dot(n) > 0.9 && n.dot(**x - surface.points[j]).abs() < within
+            squared < (2.0 * voxel).powi(2) && m.dot(n) > 0.9 && n.dot(*x - surface.points[j]).abs() < within
         };
-        moved.iter().zip(&turned).filter(lies).count()
+        moved.iter().zip(&turned).map(lies).collect()
     };
     let settled = |start: &Pose| {
         let (mut pose, mut scale, mut noise) = (*start, 2.0 * f64::from(voxel), 0.0);
@@ -150,11 +160,31 @@ fn placed(scan: &Scan, before: &[(&Scan, Pose)], candidates: &[Pose], seed: u64)
     let noise = tried.iter().map(|t| t.1).fold(f64::INFINITY, f64::min);
     let within = (ON * voxel).max(if noise.is_finite() { 3.0 * noise as f32 } else { 0.0 });
     let recorded = on(&Pose::IDENTITY, within);
-    let counts = tried.iter().enumerate().map(|(k, (pose, _))| {
+    let side = scan.voxel() * scan.space.lattice.size.max_element() as f32;
+    let middle = even.points.iter().sum::<Vec3>() / even.points.len().max(1) as f32;
+    let stays_down = |pose: &Pose| {
+        let tilt = pose.rotate(up).angle_between(up);
+        let rise = (pose.apply(middle.as_dvec3()) - middle.as_dvec3()).dot(up);
+        tilt < TILT && rise.abs() < RISE * f64::from(side)
+    };
+    let upright = tried.iter().enumerate().filter(|(_, (pose, _))| stays_down(pose));
+    let count = |on: &[bool]| on.iter().filter(|o| **o).count();
+    let places = upright.map(|(k, (pose, _))| {
         let earned = if k == 0 { EARNED_FINELY } else { EARNED };
         (on(pose, within), earned, *pose)
     });
-    let best = counts.max_by_key(|(count, _, _)| *count);
-    best.filter(|(count, earned, _)| *count >= FEW && *count as f64 > earned * recorded as f64)
-        .map_or(Pose::IDENTITY, |(_, _, pose)| pose)
+    let best = places.max_by_key(|(on, _, _)| count(on));
+    let believed = best.filter(|(on, earned, pose)| {
+        // What a push would have carried off: does it stand where it stood?
+        let carried_off = (0..on.len()).filter(|&i| {
+            let (x, n) = (even.points[i].as_dvec3(), even.normals[i].as_dvec3());
+            (pose.apply(x) - x).dot(n).abs() > CLEARLY * f64::from(within)
+        });
+        let (all, stands) = carried_off.fold((0, 0), |(all, stands), i| (all + 1, stands + usize::from(recorded[i])));
+        count(on) >= FEW
+            && count(on) as f64 > earned * count(&recorded) as f64
+            && all >= FEW / 2
+            && (stands as f64) < STANDS * all as f64
+    });
+    believed.map_or(Pose::IDENTITY, |(_, _, pose)| pose)
 }

@@ -60,11 +60,20 @@ fn absolute(path: &Path) -> Result<PathBuf> {
     path.canonicalize().map_err(Failure::io(path))
 }
 
-/// A folder in which `file` cannot be written is noticed before the work and not after it.
+/// A file of demonstrations that cannot be written is noticed before the work and not after it.
 ///
 /// # Errors
-/// When it cannot.
+/// When the folder refuses, or a file of that name is there that holds anything but demonstrations of
+/// ours.
 pub fn may_write(file: &Path) -> Result<()> {
+    let ours = || {
+        let demos = hingecast_policy::demos::read(file).ok()?;
+        Some(demos.env_args["env_name"].as_str()?.starts_with(record::ENV_NAME))
+    };
+    if file.symlink_metadata().is_ok() && ours() != Some(true) {
+        let what = "a file of this name is there, and not demonstrations that hingecast recorded";
+        return Err(Failure::new(what, file.display().to_string(), "another name: -o FILE.hdf5"));
+    }
     hingecast_geom::staging::probe(file).map_err(Failure::io(file))
 }
 

@@ -1,0 +1,117 @@
+//! Do the pictures show that a part moves at all?
+//!
+//! What a fit gains by a motion says little: where scans see different places, or cameras drift, a motion
+//! explains the difference. So every view is asked by itself. A part that has moved away is looked
+//! through where it was (at rest), by nearly all cameras that see the place; it is not looked through
+//! where it now is (moved); and no camera of its own state looks through it (own). A phantom is
+//! contradicted as much where it is said to be as where it is said to have left.
+
+use crate::observe::evidence::Evidence;
+use crate::observe::sample::Motion;
+use crate::observe::witness::{Witness, counted};
+use glam::Vec3;
+use hingecast_geom::{KinematicTree, Pose};
+use rayon::prelude::*;
+use serde::{Deserialize, Serialize};
+
+/// Points of a part's surface in one state that are looked for in the others.
+const POINTS: usize = 300;
+/// Fewer points of a state that views can judge say nothing.
+const FEW: usize = 15;
+/// Two states tell when the part's farthest point is so many tolerances apart in them.
+const APART: f32 = 3.0;
+/// What is off by less may be depth's own error: voxels.
+const SLACK: f32 = 0.75;
+
+/// How views judge a joint's part: shares of the places that they can judge which they look through.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct Shown {
+    /// Where the part would be in other states had it not moved.
+    pub at_rest: f64,
+    /// Where it is said to be in other states.
+    pub moved: f64,
+    /// Where its own state measured it.
+    pub own: f64,
+    /// Pairs of states that were compared.
+    pub pairs: usize,
+    /// States that have enough of the part's surface to be compared with others.
+    pub states: usize,
+}
+
+impl Shown {
+    /// What speaks against the motion over what speaks for it: near 0 when it is real, near 1 when as much
+    /// contradicts it as contradicts rest.
+    pub fn against(&self) -> f64 {
+        // What one state alone shows is in no other: nothing tells where it went.
+        if self.at_rest > 0.0 && self.states > 1 { (self.own + self.moved) / self.at_rest } else { f64::INFINITY }
+    }
+}
+
+/// Of every joint of `tree`. `witnesses`: some views of every state, cameras as corrected. `labels`: the part
+/// of every point of every state's cloud.
+pub fn shown(evidence: &Evidence, tree: &KinematicTree, labels: &[Vec<u8>], witnesses: &[Vec<Witness>]) -> Vec<Shown> {
+    let slack = (SLACK * evidence.lattice.voxel).max(evidence.tolerance);
+    let n = witnesses.len();
+    (0..tree.joints.len())
+        .map(|j| {
+            let of_state = |s: usize| of_state(evidence, tree, j, s, labels, witnesses, slack);
+            let by_state: Vec<Vec<[f64; 4]>> = (0..n).into_par_iter().map(of_state).collect();
+            let sums: Vec<[f64; 4]> = by_state.iter().flatten().copied().collect();
+            let states = by_state.iter().filter(|s| !s.is_empty()).count();
+            let total = sums.iter().fold([0.0; 4], |a, b| std::array::from_fn(|k| a[k] + b[k]));
+            let mean = |k: usize| if total[3] > 0.0 { total[k] / total[3] } else { 0.0 };
+            Shown { at_rest: mean(0), moved: mean(1), own: mean(2), pairs: sums.len(), states }
+        })
+        .collect()
+}
+
+/// At rest, moved, own, 1: of every state that the part of joint `j` is elsewhere in than in state `s`.
+fn of_state(
+    evidence: &Evidence,
+    tree: &KinematicTree,
+    j: usize,
+    s: usize,
+    labels: &[Vec<u8>],
+    witnesses: &[Vec<Witness>],
+    slack: f32,
+) -> Vec<[f64; 4]> {
+    let joint = &tree.joints[j];
+    let all: Vec<Vec3> = evidence.clouds[s]
+        .points
+        .iter()
+        .zip(&labels[s])
+        .filter(|(_, l)| **l as usize == joint.child)
+        .map(|(x, _)| *x)
+        .collect();
+    let points: Vec<Vec3> = all.iter().step_by(all.len().div_ceil(POINTS).max(1)).copied().collect();
+    let Some(own) = looked_through(&witnesses[s], &points, &Motion::from(Pose::IDENTITY), slack) else {
+        return Vec::new();
+    };
+    let back = tree.poses_at(s)[joint.child].inverse();
+    let mut out = Vec::new();
+    for t in (0..witnesses.len()).filter(|t| *t != s) {
+        let here = tree.poses_at(t);
+        let moved = Motion::from(here[joint.child] * back);
+        let at_rest = Motion::from(here[joint.parent] * joint.screw.motion(joint.values[s]) * back);
+        let far = points.iter().map(|x| moved.apply(*x).distance(at_rest.apply(*x))).fold(0.0, f32::max);
+        if far < APART * slack {
+            continue;
+        }
+        let through = |m: &Motion| looked_through(&witnesses[t], &points, m, slack);
+        if let (Some(rest), Some(moved)) = (through(&at_rest), through(&moved)) {
+            out.push([rest, moved, own, 1.0]);
+        }
+    }
+    out
+}
+
+/// Share of what a state's views can judge that they look through; `None` where that is hardly anything.
+fn looked_through(witnesses: &[Witness], points: &[Vec3], motion: &Motion, slack: f32) -> Option<f64> {
+    let counts = points.iter().map(|x| counted(witnesses, motion.apply(*x), slack));
+    let (mut judged, mut share) = (0usize, 0.0);
+    for (through, on) in counts.filter(|(through, on)| through + on > 0) {
+        judged += 1;
+        share += through as f64 / (through + on) as f64;
+    }
+    (judged >= FEW).then(|| share / judged as f64)
+}
