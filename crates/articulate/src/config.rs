@@ -15,6 +15,8 @@ pub struct Config {
     /// Decide labels where parts meet pixel by pixel, where depth is sharp. Twins come out better,
     /// joints stay the same.
     pub borders: bool,
+    /// In noisy recordings, fit the joints anew without a part of the views each, to know how sure they are.
+    pub resample: bool,
     /// Seed of everything random: the same seed, the same bytes.
     #[serde(skip)]
     pub seed: u64,
@@ -26,7 +28,7 @@ pub struct Config {
 
 impl Default for Config {
     fn default() -> Self {
-        Self { cells: 96, max_parts: 16, align_cameras: true, borders: true, seed: 0, skip: Vec::new() }
+        Self { cells: 96, max_parts: 16, align_cameras: true, borders: true, resample: true, seed: 0, skip: Vec::new() }
     }
 }
 

@@ -16,9 +16,10 @@ use crate::observe::{align_to_base, cameras};
 use crate::passes::driver::{PassRecord, settle};
 use crate::passes::known;
 use crate::pictures::information::{Information, of_parts};
+use crate::resample;
 use crate::search::discover::discover;
 use crate::shown::{Shown, shown};
-use crate::weigh_doubts::weigh_doubts;
+use crate::weigh_doubts::{Believed, weigh_doubts};
 use hingecast_geom::{Certainty, KinematicTree, Pose, Progress};
 
 /// Everything that the depth says about parts and joints.
@@ -147,8 +148,13 @@ pub fn find(depths: &mut dyn Depths, config: &Config, progress: &Progress) -> Re
         };
         (0..n_states).map(of_state).collect::<Result<_, _>>()?
     };
+    let resampled = match noisy && config.resample && !estimate.tree.joints.is_empty() {
+        true => resample::deviations(depths, lattice, &estimate, config, progress)?,
+        false => Vec::new(),
+    };
     let shown = shown(&evidence, &estimate.tree, &labels, &witnesses);
-    let (doubts, certainty) = weigh_doubts(&evidence, &estimate, &labels, &shown, seed);
+    let (doubts, certainty) =
+        weigh_doubts(&evidence, &estimate, &labels, &Believed { shown: &shown, resampled: &resampled }, seed);
     let samples = if noisy || !config.borders {
         let of_state = |(state, own): (usize, &Vec<u8>)| -> Vec<Labelled> {
             let points = &evidence.clouds[state].points;

@@ -40,6 +40,7 @@ pub mod model;
 pub mod observe;
 pub mod passes;
 pub mod pictures;
+mod resample;
 pub mod score;
 pub mod search;
 pub mod shown;

@@ -16,7 +16,8 @@ use std::collections::HashMap;
 /// Standard deviations worth mentioning: axis `[deg]`, pivot [share of the object's extent].
 const LOOSE_AXIS_DEG: f64 = 1.0;
 const LOOSE_PIVOT_SHARE: f64 = 0.01;
-/// The covariance counts rows that share noise and correspondences as if they did not.
+/// Where nothing was resampled: the covariance of a fit counts rows that share noise and correspondences as
+/// if they did not.
 const SIGMA_OPTIMISM: f64 = 5.0;
 /// A second piece of at least this share of its part is mentioned.
 const PIECE_SHARE: f64 = 0.2;
@@ -30,13 +31,21 @@ const UNEXPLAINED_SHARE: f64 = 0.005;
 /// Share of the part's samples that a state must confirm.
 const SEEN_SHARE: f64 = 0.05;
 
+/// What single views say.
+pub struct Believed<'a> {
+    /// How views judge the motion of each joint.
+    pub shown: &'a [Shown],
+    /// Standard deviations of each joint without some of the views; empty where that was not tried.
+    pub resampled: &'a [[f64; 3]],
+}
+
 /// Doubts, gravest first, and how sure one may be of each joint. `clouds`: the part of every point
-/// of every state's cloud; `shown`: how views judge each joint.
+/// of every state's cloud; `believed`: what was tried with single views.
 pub fn weigh_doubts(
     evidence: &Evidence,
     found: &Estimate,
     clouds: &[Vec<u8>],
-    shown: &[Shown],
+    believed: &Believed,
     seed: u64,
 ) -> (Vec<Doubt>, Vec<Certainty>) {
     let (mut out, mut certainty) = (Vec::new(), Vec::new());
@@ -46,8 +55,8 @@ pub fn weigh_doubts(
     }
     for (j, joint) in tree.joints.iter().enumerate() {
         let name = || joint.name.clone();
-        let Shown { at_rest, moved, own, .. } = shown[j];
-        if shown[j].against() > MOVES {
+        let Shown { at_rest, moved, own, .. } = believed.shown[j];
+        if believed.shown[j].against() > MOVES {
             out.push(Doubt::MayNotMove { joint: name(), at_rest, moved: moved.max(own) });
         }
         let members = found.owners.members(evidence, joint.child);
@@ -56,7 +65,8 @@ pub fn weigh_doubts(
         if nats < REFUTED_NATS {
             out.push(Doubt::Undecidable { joint: name(), rival, nats });
         }
-        let [axis, pivot, value] = found.report.sigmas[j].map(|sigma| SIGMA_OPTIMISM * sigma);
+        let fitted = found.report.sigmas[j].map(|sigma| SIGMA_OPTIMISM * sigma);
+        let [axis, pivot, value] = believed.resampled.get(j).copied().unwrap_or(fitted);
         let axis = axis.to_degrees();
         certainty.push(Certainty { axis_deg: axis, pivot, value, rival, nats });
         if axis > LOOSE_AXIS_DEG {

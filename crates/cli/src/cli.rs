@@ -216,6 +216,14 @@ pub struct Check {
 pub struct Mask {
     /// Recording folder (the one that holds transforms.json).
     pub recording: PathBuf,
+    /// The object is all that is in this box and not floor or wall: lowest and highest corner, world
+    /// frame, scene units [default: it is what moves, and what that hangs on].
+    #[arg(long, value_name = "X0,Y0,Z0,X1,Y1,Z1", allow_hyphen_values = true, conflicts_with = "at")]
+    pub r#box: Option<String>,
+    /// The object is the thing that this pixel of a picture shows, for instance
+    /// rgb/s000_v003.png:160,120.
+    #[arg(long, value_name = "PICTURE:U,V")]
+    pub at: Option<String>,
     /// Seed of the samples that are looked at.
     #[arg(long, default_value_t = 0, value_name = "N")]
     pub seed: u64,
@@ -240,6 +248,10 @@ pub struct Build {
     /// Throw an existing run away first.
     #[arg(long)]
     pub fresh: bool,
+    /// Build even where `check` finds what makes it vain: wrong unit of depth, frames that differ,
+    /// nothing that moves.
+    #[arg(long)]
+    pub force: bool,
     /// Exit with 1 when the run has doubts.
     #[arg(long)]
     pub strict: bool,

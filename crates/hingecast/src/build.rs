@@ -75,6 +75,8 @@ pub struct Options {
     pub to: Option<Stage>,
     /// Throw what an existing run has made away first.
     pub fresh: bool,
+    /// Build also from a recording of which [`check`](crate::prepare::check()) says that it is in vain.
+    pub force: bool,
     /// Worker threads of this build, in a pool of its own; 0 = as many as the machine has cores.
     /// The results do not depend on it.
     pub threads: usize,
@@ -141,7 +143,8 @@ fn build_with(
     let path = run.join("config.toml");
     hingecast_geom::staging::write_whole(&path, text.as_bytes()).map_err(Failure::io(&path))?;
 
-    let (prepared, doubts) = crate::prepare::for_build(&mut recording, &mut folder, config.seed, watcher)?;
+    let (prepared, doubts) =
+        crate::prepare::for_build(&mut recording, &mut folder, (config.seed, options.force), watcher)?;
     let cache = ViewCache::new(&recording, config.memory_mb << 20);
     let background = targets::background(&recording, &cache)?;
     let mut inputs =

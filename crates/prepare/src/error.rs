@@ -53,6 +53,9 @@ pub enum PrepareError {
         /// Share of moved surface on the largest piece, percent.
         percent: f64,
     },
+    /// Nothing but floor and wall is where a person says that the object is.
+    #[error("nothing but floor and wall is where the object is said to be")]
+    NothingThere,
     /// The cameras look at nothing in common.
     #[error("the cameras look at nothing in common that has depth")]
     NoFocus,

@@ -19,7 +19,7 @@ mod scan;
 mod settle;
 
 pub use error::PrepareError;
-pub use mask::{MaskReport, Masks, object_masks};
-pub use register::{Registration, register, steady};
+pub use mask::{MaskReport, Masks, Wanted, object_masks};
+pub use register::{Registration, apart, register, steady};
 pub use scan::Scan;
 pub use settle::settle;

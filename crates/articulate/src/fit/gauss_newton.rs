@@ -125,6 +125,8 @@ struct Round<'a> {
 const LEAST_REACH: f32 = 1.2;
 /// A step that moves no member by more than this share of the gate is taken unasked.
 const SMALL: f64 = 0.25;
+/// A slide goes at most so far in one step, shares of the object's extent.
+const LONGEST_SLIDE: f64 = 0.2;
 /// Members that tell how far a step moves them: every so many.
 const TELLING: usize = 29;
 /// Damping of the first try, shares of the diagonal; each further try takes the next one. The last
@@ -149,8 +151,11 @@ fn step(ask: &Round, tree: &mut KinematicTree, sums: &Sums) -> Option<Cholesky<f
     let first = damped(DAMPING[0])?;
     for (k, damping) in DAMPING.into_iter().enumerate() {
         let by = if k == 0 { first.solve(&sums.b) } else { damped(damping)?.solve(&sums.b) };
+        if by.iter().any(|x| !x.is_finite()) {
+            return None;
+        }
         let mut trial = tree.clone();
-        update(&mut trial, ask.slots, &by);
+        update(&mut trial, ask.slots, &by, LONGEST_SLIDE * f64::from(ask.evidence.extent()));
         if ask.farthest(tree, &trial) < SMALL * ask.gate || ask.all(&trial).cost <= sums.cost {
             *tree = trial;
             break;

@@ -33,20 +33,24 @@ pub fn slots(tree: &KinematicTree, free: &[bool], n_states: usize) -> (Vec<Optio
     (slots.collect(), size)
 }
 
-/// Adds a step to the unknowns.
-pub fn update(tree: &mut KinematicTree, slots: &[Option<Slot>], step: &DVector<f64>) {
+/// Longest tilt of an axis and turn of a hinge in one step, radians: beyond, the linearisation knows
+/// nothing.
+pub const LONGEST_TURN: f64 = 0.2;
+
+/// Adds a step to the unknowns. `longest`: how far a slide may go in one step, scene units.
+pub fn update(tree: &mut KinematicTree, slots: &[Option<Slot>], step: &DVector<f64>, longest: f64) {
     for (joint, slot) in tree.joints.iter_mut().zip(slots) {
         let Some(slot) = slot else { continue };
         let [b1, b2] = square(joint.screw.axis);
         let at = |k: usize| step[slot.shape + k];
-        // A step longer than this is not one that the linearisation knows anything about.
-        let tilt = (b1 * at(0) + b2 * at(1)).clamp_length_max(0.2);
+        let tilt = (b1 * at(0) + b2 * at(1)).clamp_length_max(LONGEST_TURN);
         if slot.n_shape == 4 {
             joint.screw.pivot += b1 * at(2) + b2 * at(3);
         }
         joint.screw.axis = (DMat3::from_quat(quat_from_rotation_vector(tilt)) * joint.screw.axis).normalize();
+        let most = if slot.n_shape == 4 { LONGEST_TURN } else { longest };
         for (s, q) in joint.values.iter_mut().enumerate().skip(1) {
-            *q += step[slot.values + s - 1];
+            *q += step[slot.values + s - 1].clamp(-most, most);
         }
     }
 }
@@ -104,7 +108,7 @@ mod tests {
                         tree.joints[j].values[0] += step;
                     }
                     let slots: Vec<Option<Slot>> = (0..2).map(|i| (i == j).then_some(slot)).collect();
-                    update(&mut tree, &slots, &by);
+                    update(&mut tree, &slots, &by, 1.0);
                     carried(&tree)
                 };
                 let numeric = (moved(h) - moved(-h)) / (2.0 * h);

@@ -1,6 +1,7 @@
 //! Edits of a kinematic tree that keep its numbering.
 
 use hingecast_geom::KinematicTree;
+use std::f64::consts::TAU;
 
 /// Moving parts that carry no other.
 pub fn leaves(tree: &KinematicTree) -> impl Iterator<Item = usize> {
@@ -23,7 +24,8 @@ pub fn without(tree: &KinematicTree, part: usize) -> KinematicTree {
     tree
 }
 
-/// Values count from the first state, mostly upwards; limits are what was seen.
+/// Values count from the first state, mostly upwards; limits are what was seen. A hinge that is said to turn
+/// more than once around is counted within half a turn of the first state: nothing tells whole turns.
 pub fn count_from_first(tree: &mut KinematicTree) {
     for j in 0..tree.joints.len() {
         let (zero, screw) = (tree.joints[j].values[0], tree.joints[j].screw);
@@ -37,6 +39,10 @@ pub fn count_from_first(tree: &mut KinematicTree) {
         }
         let joint = &mut tree.joints[j];
         joint.values.iter_mut().for_each(|v| *v -= zero);
+        let range = joint.seen()[1] - joint.seen()[0];
+        if joint.screw.kind.turns() && range > TAU {
+            joint.values.iter_mut().for_each(|v| *v -= TAU * (*v / TAU).round());
+        }
         if joint.values.iter().sum::<f64>() < 0.0 {
             joint.screw.axis = -joint.screw.axis;
             joint.values.iter_mut().for_each(|v| *v = -*v);
@@ -48,6 +54,24 @@ pub fn count_from_first(tree: &mut KinematicTree) {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use std::f64::consts::PI;
+
+    /// A shadow of a door once went from 0.6 to 651 rad, into the URDF's limits.
+    #[test]
+    fn no_hinge_turns_more_than_once_around() {
+        let screw = Screw { kind: JointKind::Revolute, axis: DVec3::Z, pivot: DVec3::X };
+        let values = vec![0.3, 651.0, -2.0];
+        let joint = Joint { name: "j".into(), parent: 0, child: 1, screw, values, limits: [0.0; 2] };
+        let mut tree = KinematicTree { parts: vec!["a".into(), "b".into()], joints: vec![joint], ..Default::default() };
+        let before: Vec<_> = (0..3).map(|s| tree.poses_at(s)[1] * tree.poses_at(0)[1].inverse()).collect();
+        count_from_first(&mut tree);
+        let [lo, hi] = tree.joints[0].limits;
+        assert!(hi - lo <= TAU && lo >= -PI && hi <= PI, "{lo} {hi}");
+        for (s, was) in before.iter().enumerate() {
+            let now = tree.poses_at(s)[1] * tree.poses_at(0)[1].inverse();
+            assert!((now.apply(DVec3::Y) - was.apply(DVec3::Y)).length() < 1e-9);
+        }
+    }
     use glam::DVec3;
     use hingecast_geom::{Joint, JointKind, Screw};
 

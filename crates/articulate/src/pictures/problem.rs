@@ -10,11 +10,11 @@
 //! the frame of every state, which is eliminated (Schur).
 
 use super::gradient::ByPart;
-use crate::fit::unknowns::{Slot, update};
+use crate::fit::unknowns::{LONGEST_TURN, Slot, update};
 use crate::model::twist::{Twist, twists};
 use glam::DVec3;
 use hingecast_geom::pose::{quat_from_rotation_vector, rotation_vector};
-use hingecast_geom::{KinematicTree, Pose};
+use hingecast_geom::{Joint, KinematicTree, Pose};
 use hingecast_splat::{Engine, Gradients, SplatError, Target};
 use nalgebra::{DMatrix, DVector, Matrix6, Vector6};
 use std::sync::Arc;
@@ -168,10 +168,18 @@ impl Problem<'_> {
         }
         let Some(solved) = a.cholesky() else { return Ok(None) };
         let by = solved.solve(&b);
+        if by.iter().any(|x| !x.is_finite()) {
+            return Ok(None);
+        }
         let mut next = guess.clone();
-        update(&mut next.tree, &self.slots, &by);
+        // Half of what any slide does: the depth has been near already.
+        let range = |joint: &Joint| joint.seen()[1] - joint.seen()[0];
+        let slides = guess.tree.joints.iter().filter(|j| !j.screw.kind.turns());
+        let longest = 0.5 * slides.map(range).fold(0.0, f64::max);
+        update(&mut next.tree, &self.slots, &by, longest);
         for (j, joint) in next.tree.joints.iter_mut().enumerate() {
-            joint.values[0] += by[self.zeros + j];
+            let most = if joint.screw.kind.turns() { LONGEST_TURN } else { longest };
+            joint.values[0] += by[self.zeros + j].clamp(-most, most);
         }
         for ((state_from_world, frame), inverse) in next.state_from_world.iter_mut().zip(&sums.frames).zip(inverses) {
             let xi = -(inverse * (frame.gradient + &frame.by_joints * &by));

@@ -107,7 +107,7 @@ fn gradients_agree_with_central_differences() {
             let mut moved = guess.clone();
             let mut by = DVector::zeros(problem.size());
             by[k] = step;
-            update(&mut moved.tree, &problem.slots, &by);
+            update(&mut moved.tree, &problem.slots, &by, 1.0);
             moved.tree.joints[0].values[0] += by[problem.zeros];
             cost(&moved)
         };

@@ -45,6 +45,8 @@ pub struct Finding {
     pub hint: String,
     /// What `fix` would do about it.
     pub fix: Option<Fix>,
+    /// The state that it is about, if it is about one.
+    pub state: Option<usize>,
 }
 
 impl std::fmt::Display for Finding {
@@ -86,6 +88,13 @@ impl CheckReport {
     /// True when `build` cannot go on.
     pub fn has_errors(&self) -> bool {
         self.findings.iter().any(|f| f.severity == Severity::Error)
+    }
+
+    /// What makes a whole build worthless, rather than a frame or two of it.
+    pub fn grave(&self) -> impl Iterator<Item = &Finding> {
+        const GRAVE: [&str; 6] =
+            ["camera-axes", "depth-unit", "views-disagree", "one-place", "states-apart", "nothing-moves"];
+        self.findings.iter().filter(|f| f.severity == Severity::Error && GRAVE.contains(&f.code))
     }
 
     /// The findings for a person: of many alike the first few, the last of them saying how many
@@ -152,11 +161,11 @@ pub fn check(path: &Path, progress: &Progress) -> Result<CheckReport, CaptureErr
 }
 
 fn error(code: &'static str, e: CaptureError) -> Finding {
-    Finding { severity: Severity::Error, code, what: e.what, place: e.place, hint: e.hint, fix: None }
+    Finding { severity: Severity::Error, code, what: e.what, place: e.place, hint: e.hint, fix: None, state: None }
 }
 
 fn warning(code: &'static str, what: String, place: String, hint: &str) -> Finding {
-    Finding { severity: Severity::Warning, code, what, place, hint: hint.into(), fix: None }
+    Finding { severity: Severity::Warning, code, what, place, hint: hint.into(), fix: None, state: None }
 }
 
 /// Where frame `i` of the recording stands in its file: frames with problems were left out, so

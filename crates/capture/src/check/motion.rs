@@ -2,7 +2,7 @@
 //! moved stands where those see past it.
 
 use super::pixels::Look;
-use super::{Finding, warning};
+use super::{Finding, Severity, warning};
 use crate::Recording;
 use glam::DVec3;
 use hingecast_geom::Camera;
@@ -13,6 +13,8 @@ const IN_FRONT: f64 = 0.015;
 /// many times what a state contradicts itself, shows no motion. Share of the points.
 const MOVES: f64 = 0.004;
 const NOISE: f64 = 1.5;
+/// With no more than this beyond what a state contradicts itself, not even something small moves.
+const NOTHING: f64 = 2e-4;
 
 /// `by_state`: frames with depth, of every state.
 pub(super) fn nothing_moves(recording: &Recording, looks: &[Option<Look>], by_state: &[Vec<usize>]) -> Option<Finding> {
@@ -55,7 +57,11 @@ pub(super) fn nothing_moves(recording: &Recording, looks: &[Option<Look>], by_st
     );
     let hint =
         "each state should show the object in another configuration; a part that is small against it is no matter";
-    Some(warning("nothing-moves", what, recording.root.display().to_string(), hint))
+    let mut finding = warning("nothing-moves", what, recording.root.display().to_string(), hint);
+    if most < noise + NOTHING {
+        finding.severity = Severity::Error;
+    }
+    Some(finding)
 }
 
 /// How many points a view sees past, of those that it could see. The pixels around must do so, too:

@@ -227,6 +227,7 @@ fn states_apart(recording: &Recording, looks: &[Option<Look>], by_state: &[Vec<u
             );
             let hint = "register all states together (one reconstruction over all pictures), then export again";
             let mut finding = error("states-apart", CaptureError::new(what, place, hint));
+            finding.state = Some(s);
             // With two states nothing tells a registration that failed from an object of which most
             // has moved.
             if n == 2 {

@@ -42,7 +42,7 @@ fn options(session: &Session, args: &Build, method: Method) -> Result<Options> {
             format!("the stages are, in order: {}", names.join(", ")),
         ));
     }
-    Ok(Options { from, to, fresh: args.fresh, ..session.options() })
+    Ok(Options { from, to, fresh: args.fresh, force: args.force, ..session.options() })
 }
 
 /// The settings of the run that is there, as its file has them.

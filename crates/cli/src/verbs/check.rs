@@ -3,16 +3,17 @@
 use super::{Outcome, Session};
 use crate::cli::Check;
 use hingecast::failure::Result;
-use hingecast_capture::check::{StateFrames, check, fix};
+use hingecast::prepare::check;
+use hingecast_capture::check::{StateFrames, fix};
 
 pub fn run(session: &Session, args: &Check) -> Result<Outcome> {
-    let mut report = check(&args.recording, &session.ui.stage("check"))?;
+    let mut report = check(&args.recording, 0, &session.ui.stage("check"))?;
     let mut repaired = Vec::new();
     if args.fix {
         repaired = fix(&args.recording, &report)?;
         repaired.iter().for_each(|line| session.ui.say(&format!("repaired: {line}")));
         if !repaired.is_empty() {
-            report = check(&args.recording, &session.ui.stage("check"))?;
+            report = check(&args.recording, 0, &session.ui.stage("check"))?;
         }
     }
     for finding in report.summary() {

@@ -4,24 +4,32 @@
 //! `import` and `hingecast mask` write what was found into the recording; `build` keeps it in the
 //! run's folder `prepare/` and leaves the recording alone.
 
+mod examine;
+mod masks;
 mod raw_depths;
 mod sheet;
+mod words;
 
 use crate::failure::{Failure, Result};
 use crate::stage::{RunFolder, stamp, write_json};
 use crate::watcher::Watcher;
-use hingecast_capture::recording::images;
 use hingecast_capture::{Recording, Split};
 use hingecast_geom::{Pose, Progress};
 use hingecast_prepare::register::Freedom;
-use hingecast_prepare::{MaskReport, PrepareError, Registration, object_masks};
+use hingecast_prepare::{MaskReport, PrepareError, Registration};
+use masks::mask_name;
 use raw_depths::RawDepths;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
+use words::failure;
 
+pub use examine::check;
+pub use hingecast_prepare::Wanted;
+pub use masks::{find_masks, place_at};
 pub use sheet::contact_sheet;
+pub use words::sentence;
 
 /// The name of the step, and of its folder in a run.
 pub const STAGE: &str = "prepare";
@@ -132,43 +140,15 @@ fn apply(recording: &mut Recording, common_from_state: &[Pose]) {
     }
 }
 
-/// Finds the object and writes its masks into `folder`, one PNG a training frame, named as the
-/// colour image is; frames point there.
-///
-/// # Errors
-/// Nothing that moves, a picture that cannot be read or written, the wish to stop.
-pub fn find_masks(recording: &mut Recording, folder: &Path, seed: u64, progress: &Progress) -> Result<MaskReport> {
-    let mut depths = RawDepths::new(recording);
-    let found = object_masks(&mut depths, recording.up, seed, progress).map_err(|e| failure(e, recording))?;
-    for (state, masks) in found.masks.iter().enumerate() {
-        for (frame, mask) in recording.frames_of(state, Split::Train).into_iter().zip(masks) {
-            let path = folder.join(mask_name(recording, frame));
-            let camera = &recording.frames[frame].camera;
-            let bytes: Vec<u8> = mask.iter().map(|m| 255 * m).collect();
-            images::write_gray(&path, &bytes, camera.width, camera.height)?;
-            recording.frames[frame].mask = Some(path);
-        }
-    }
-    Ok(found.report)
-}
-
-/// `s003_v012.png`, which no two frames share.
-fn mask_name(recording: &Recording, frame: usize) -> String {
-    let f = &recording.frames[frame];
-    let before = recording.frames[..frame].iter().filter(|o| (o.state, o.view) == (f.state, f.view)).count();
-    let more = if before > 0 { format!("_{before}") } else { String::new() };
-    format!("s{:03}_v{:03}{more}.png", f.state, f.view)
-}
-
 /// What `build` does before its stages: the stamp of what was done, empty if nothing had to be, and the
 /// doubts about it.
 pub(crate) fn for_build(
     recording: &mut Recording,
     folder: &mut RunFolder,
-    seed: u64,
+    (seed, force): (u64, bool),
     watcher: &dyn Watcher,
 ) -> Result<(String, Vec<String>)> {
-    let own = stamp(&[&folder.record.fingerprint, &seed, &STAGE]);
+    let own = stamp(&[&folder.record.fingerprint, &seed, &STAGE, &force]);
     let answer = |prepared: Prepared, own: String| match prepared.is_nothing() {
         true => (String::new(), Vec::new()),
         false => (own, prepared.doubts),
@@ -181,9 +161,13 @@ pub(crate) fn for_build(
         return Ok(answer(prepared, own));
     }
     let start = Instant::now();
-    let at = folder.begin(STAGE, &own, true)?;
     let progress = watcher.stage(STAGE);
-    let prepared = prepared(&mut recording.clone(), &at, seed, &progress, watcher)?;
+    // Asked before what an earlier build left is touched.
+    let apart = !force && examine::before_build(recording, seed, &progress)?;
+    let at = folder.begin(STAGE, &own, true)?;
+    let mut changed = recording.clone();
+    changed.registered &= !apart;
+    let prepared = prepared(&mut changed, &at, seed, &progress, watcher)?;
     drop(progress);
     write_json(&at.join("prepare.json"), &prepared)?;
     folder.finish(STAGE, &own, start.elapsed().as_secs_f64())?;
@@ -215,7 +199,7 @@ fn prepared(
     }
     if needs.masks {
         watcher.say("the recording has no masks: the object is taken for what moves and what that hangs on");
-        let report = find_masks(recording, at, seed, progress)?;
+        let report = find_masks(recording, &Wanted::Moving, at, seed, progress)?;
         contact_sheet(recording)?.save(at.join("masks.png")).map_err(Failure::io(at))?;
         prepared.doubts.clone_from(&report.doubts);
         prepared.masks = Some(report);
@@ -295,50 +279,4 @@ pub fn recording_of(run: &RunFolder) -> Result<Recording> {
         restore(&mut recording, &run.folder(STAGE))?;
     }
     Ok(recording)
-}
-
-/// How sure a registration is, for a person.
-pub fn sentence(found: &Registration) -> String {
-    let used = found.pairs.iter().filter(|p| p.used);
-    let worst = used.min_by(|a, b| a.share.total_cmp(&b.share));
-    worst.map_or("one state: nothing to register".into(), |p| {
-        format!(
-            "{} states brought into one frame: of what two scans both see at least {:.0} % agrees (states {} and {}; second best place {:.0} % as good)",
-            found.common_from_state.len(),
-            100.0 * p.share,
-            p.states.0,
-            p.states.1,
-            100.0 * p.second
-        )
-    })
-}
-
-fn failure(e: PrepareError, recording: &Recording) -> Failure {
-    let place = recording.root.display().to_string();
-    let hint = match &e {
-        PrepareError::Empty { .. } => "record that state again from nearer; does its depth have the right unit?",
-        PrepareError::Apart { .. } => {
-            "record with more overlap: the same side of the object, floor and wall around it, in every scan"
-        }
-        PrepareError::Ambiguous { .. } => {
-            "put a few things around the object that stay where they are, and have them in every scan"
-        }
-        PrepareError::NothingMoved { .. } => {
-            "move every part by more than its own thickness between scans; or give masks of the object"
-        }
-        PrepareError::NoObject { .. } => {
-            "give masks of the object: mask_path of every frame, see docs/recordings.md; was something else moved, too?"
-        }
-        PrepareError::NoFocus => "point the camera at the object; check poses and the unit of depth",
-        PrepareError::Depths(_) => "run `hingecast check` on the recording",
-        PrepareError::Cancelled(_) => "",
-    };
-    match e {
-        PrepareError::Cancelled(c) => c.into(),
-        PrepareError::Depths(d) => match d.downcast::<Failure>() {
-            Ok(own) => *own,
-            Err(d) => Failure::new(d.to_string(), place, hint),
-        },
-        e => Failure::new(e.to_string(), place, hint),
-    }
 }

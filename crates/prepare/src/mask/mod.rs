@@ -45,6 +45,18 @@ pub struct Masks {
     pub report: MaskReport,
 }
 
+/// What a person says about where the object is.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub enum Wanted {
+    /// Nothing: it is what moves, and what that hangs on.
+    #[default]
+    Moving,
+    /// All that is in this box (lowest and highest corner, world frame, scene units) and not floor or wall.
+    InBox([f32; 3], [f32; 3]),
+    /// The thing at this place, world frame.
+    At([f32; 3]),
+}
+
 /// What the room and the object were taken for.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct MaskReport {
@@ -68,13 +80,19 @@ pub(crate) struct Room {
     pub moved: Vec<Vec<bool>>,
 }
 
-/// Finds the object in recordings without masks. Pixels of class `OBJECT` are those with depth;
+/// Finds the object in recordings without masks, by what a person says about it. Pixels of class `OBJECT` are those with depth;
 /// cameras of all states are in one frame, in which `up` is up.
 ///
 /// # Errors
-/// Nothing that moves, cameras that look at nothing in common, a view that cannot be read, the wish
-/// to stop.
-pub fn object_masks(depths: &mut dyn Depths, up: DVec3, seed: u64, progress: &Progress) -> Result<Masks, PrepareError> {
+/// Nothing that moves where only that tells, nothing at the place that is named, cameras that look at nothing
+/// in common, a view that cannot be read, the wish to stop.
+pub fn object_masks(
+    depths: &mut dyn Depths,
+    wanted: &Wanted,
+    up: DVec3,
+    seed: u64,
+    progress: &Progress,
+) -> Result<Masks, PrepareError> {
     let n = depths.n_states();
     let lattice = looked_at(depths)?;
     let (mut clouds, mut witnesses) = (Vec::new(), Vec::new());
@@ -89,7 +107,7 @@ pub fn object_masks(depths: &mut dyn Depths, up: DVec3, seed: u64, progress: &Pr
     drop(witnesses);
     let room = Room { lattice, clouds, moved };
     let count: usize = room.moved.iter().flatten().filter(|m| **m).count();
-    if count < FEW_MOVED {
+    if count < FEW_MOVED && *wanted == Wanted::Moving {
         return Err(PrepareError::NothingMoved { samples: count });
     }
     let mut supports = planes::supports(&room, up.as_vec3(), seed);
@@ -100,13 +118,20 @@ pub fn object_masks(depths: &mut dyn Depths, up: DVec3, seed: u64, progress: &Pr
         pieces.add(&depths.views(state)?, &supports);
     }
     let mut doubts = Vec::new();
-    let (object, share) = pieces.object(&room, &mut doubts);
-    if share < HARDLY {
-        return Err(PrepareError::NoObject { percent: 100.0 * share });
-    }
-    if share < MOSTLY {
-        doubts.push(format!("only {:.0} % of what moved is on the object that was found", 100.0 * share));
-    }
+    let object = match wanted {
+        Wanted::InBox(lo, hi) => pieces.inside((*lo).into(), (*hi).into()).ok_or(PrepareError::NothingThere)?,
+        Wanted::At(x) => pieces.at((*x).into()).ok_or(PrepareError::NothingThere)?,
+        Wanted::Moving => {
+            let (object, share) = pieces.object(&room, &mut doubts);
+            if share < HARDLY {
+                return Err(PrepareError::NoObject { percent: 100.0 * share });
+            }
+            if share < MOSTLY {
+                doubts.push(format!("only {:.0} % of what moved is on the object that was found", 100.0 * share));
+            }
+            object
+        }
+    };
     let mut masks = Vec::new();
     let mut shares = Vec::new();
     for state in 0..n {

@@ -21,6 +21,8 @@ const TOUCH: i32 = 2;
 const ALSO: f64 = 0.25;
 /// Pieces with at least this share are named.
 const NAMED: f64 = 0.05;
+/// A place that a person names is at most so many cells from the thing that is meant.
+const NAMED_PLACE: i32 = 4;
 /// Beyond this share of z, times pixels, a neighbour lies on another surface.
 const JUMP: f32 = 4.0;
 
@@ -79,40 +81,30 @@ impl Pieces {
         }
     }
 
+    /// Everything in a box that is not the room's; `None` where nothing is.
+    pub fn inside(&self, lo: Vec3, hi: Vec3) -> Option<Object> {
+        let middle = |i: usize| self.lattice.lo + (self.coords(i).as_vec3() + 0.5) * self.lattice.voxel;
+        let own = |i: usize| self.counts[i] > 0 && middle(i).cmpge(lo).all() && middle(i).cmple(hi).all();
+        let cells: Vec<bool> = (0..self.counts.len()).map(own).collect();
+        cells.contains(&true).then_some(Object { lattice: self.lattice, cells })
+    }
+
+    /// The piece at a place, or nearest to it within a few cells.
+    pub fn at(&self, x: Vec3) -> Option<Object> {
+        let (piece, count) = self.pieces();
+        let at = cell(&self.lattice, x);
+        let away = |i: &usize| (self.coords(*i) - at).length_squared();
+        let near = (0..piece.len()).filter(|i| piece[*i] > 0).min_by_key(away)?;
+        if away(&near) > NAMED_PLACE * NAMED_PLACE {
+            return None;
+        }
+        let own: Vec<bool> = (0..=count).map(|p| p == piece[near]).collect();
+        Some(self.grown(&piece, &own))
+    }
+
     /// The pieces that moved surface is on, and the share of moved surface that is on them.
     pub fn object(&self, room: &Room, doubts: &mut Vec<String>) -> (Object, f64) {
-        let size = self.lattice.size;
-        let index = |c: IVec3| ((c.z * size.y + c.y) * size.x + c.x) as usize;
-        let coords = |i: usize| {
-            let i = i as i32;
-            IVec3::new(i % size.x, i / size.x % size.y, i / (size.x * size.y))
-        };
-        let full = |i: usize| self.counts[i] >= PIXELS;
-        let mut piece = vec![0u32; self.counts.len()];
-        let mut count = 0;
-        for start in 0..piece.len() {
-            if piece[start] > 0 || !full(start) {
-                continue;
-            }
-            count += 1;
-            piece[start] = count;
-            let mut open = vec![start];
-            while let Some(i) = open.pop() {
-                let at = coords(i);
-                let (lo, hi) = ((at - TOUCH).max(IVec3::ZERO), (at + TOUCH).min(size - IVec3::ONE));
-                for z in lo.z..=hi.z {
-                    for y in lo.y..=hi.y {
-                        for x in lo.x..=hi.x {
-                            let j = index(IVec3::new(x, y, z));
-                            if piece[j] == 0 && full(j) {
-                                piece[j] = count;
-                                open.push(j);
-                            }
-                        }
-                    }
-                }
-            }
-        }
+        let (piece, count) = self.pieces();
         let mut moved = vec![0usize; count as usize + 1];
         for (cloud, m) in room.clouds.iter().zip(&room.moved) {
             for (x, _) in cloud.points.iter().zip(m).filter(|(_, m)| **m) {
@@ -134,16 +126,64 @@ impl Pieces {
             doubts.push(format!("the object is in {together} pieces that do not touch"));
         }
         let on: usize = moved.iter().zip(&own).filter(|(_, own)| **own).map(|(m, _)| m).sum();
+        (self.grown(&piece, &own), on as f64 / all.max(1) as f64)
+    }
+
+    fn index(&self, c: IVec3) -> usize {
+        let size = self.lattice.size;
+        ((c.z * size.y + c.y) * size.x + c.x) as usize
+    }
+
+    fn coords(&self, i: usize) -> IVec3 {
+        let (i, size) = (i as i32, self.lattice.size);
+        IVec3::new(i % size.x, i / size.x % size.y, i / (size.x * size.y))
+    }
+
+    /// The piece of every cell, from 1, 0 where nothing is; and how many there are.
+    fn pieces(&self) -> (Vec<u32>, u32) {
+        let size = self.lattice.size;
+        let full = |i: usize| self.counts[i] >= PIXELS;
+        let mut piece = vec![0u32; self.counts.len()];
+        let mut count = 0;
+        for start in 0..piece.len() {
+            if piece[start] > 0 || !full(start) {
+                continue;
+            }
+            count += 1;
+            piece[start] = count;
+            let mut open = vec![start];
+            while let Some(i) = open.pop() {
+                let at = self.coords(i);
+                let (lo, hi) = ((at - TOUCH).max(IVec3::ZERO), (at + TOUCH).min(size - IVec3::ONE));
+                for z in lo.z..=hi.z {
+                    for y in lo.y..=hi.y {
+                        for x in lo.x..=hi.x {
+                            let j = self.index(IVec3::new(x, y, z));
+                            if piece[j] == 0 && full(j) {
+                                piece[j] = count;
+                                open.push(j);
+                            }
+                        }
+                    }
+                }
+            }
+        }
+        (piece, count)
+    }
+
+    /// The cells of some pieces.
+    fn grown(&self, piece: &[u32], own: &[bool]) -> Object {
+        let size = self.lattice.size;
         // Cells that few pixels hit - a door seen slantwise - go with those around them.
         let around = |i: usize| {
-            let at = coords(i);
+            let at = self.coords(i);
             let near = (0..27).map(|k| at + IVec3::new(k % 3 - 1, k / 3 % 3 - 1, k / 9 - 1));
             let inside = near.filter(|c| c.cmpge(IVec3::ZERO).all() && c.cmplt(size).all());
-            inside.into_iter().any(|c| own[piece[index(c)] as usize])
+            inside.into_iter().any(|c| own[piece[self.index(c)] as usize])
         };
         let is_own = |i: usize| own[piece[i] as usize] || (piece[i] == 0 && self.counts[i] > 0 && around(i));
         let cells = (0..piece.len()).map(is_own).collect();
-        (Object { lattice: self.lattice, cells }, on as f64 / all.max(1) as f64)
+        Object { lattice: self.lattice, cells }
     }
 }
 

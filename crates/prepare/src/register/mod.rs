@@ -5,12 +5,14 @@
 //! refined, and judged by what agrees less what one scan saw where the other looked through. The
 //! best pairs connect all states; then all are refined together, finely.
 
+mod apart;
 mod balanced;
 mod fine;
 mod pair;
 mod steady;
 mod votes;
 
+pub use apart::apart;
 pub use steady::steady;
 
 use crate::error::PrepareError;
@@ -80,9 +82,7 @@ pub fn register(
     let mut scans = Vec::new();
     for state in 0..n {
         progress.report(state, n, "scans")?;
-        let scan = Scan::new(&depths.views(state)?, AROUND);
-        let samples = scan.as_ref().map_or(0, |s| s.coarse.points.len());
-        scans.push(scan.filter(|_| samples >= FEW).ok_or(PrepareError::Empty { state, samples })?);
+        scans.push(scan(depths, state)?);
     }
     let pairs: Vec<(usize, usize)> = (1..n)
         .flat_map(|s| (0..s).map(move |r| (r, s)))
@@ -104,6 +104,13 @@ pub fn register(
         used,
     });
     Ok(Registration { common_from_state, pairs: reports.collect(), circle })
+}
+
+/// A state's scan.
+fn scan(depths: &mut dyn Depths, state: usize) -> Result<Scan, PrepareError> {
+    let scan = Scan::new(&depths.views(state)?, AROUND);
+    let samples = scan.as_ref().map_or(0, |s| s.coarse.points.len());
+    scan.filter(|_| samples >= FEW).ok_or(PrepareError::Empty { state, samples })
 }
 
 /// All states, connected by the best pairs.

@@ -32,6 +32,8 @@ pub(super) struct Placed {
     pub second: f64,
     /// How far away the second best is: radians, farthest point in scene units.
     pub rival: (f64, f64),
+    /// The score of the place that was recorded, give or take a voxel or two.
+    pub recorded: f64,
     /// The middle of the source, in the target's frame.
     pub centre: DVec3,
 }
@@ -65,6 +67,11 @@ pub(super) fn align(source: &Scan, target: &Scan, freedom: Freedom, seed: u64) -
         out.sort_by(|a, b| b.1.total_cmp(&a.1));
         distinct(out, &judges.0.points, 4.0 * voxel)
     };
+    let here = |gates: &[f32]| {
+        let pose = refined(&judges.0, 1, &surface, Pose::IDENTITY, gates, voxel);
+        score(&judges.0, &judges.1, source, target, &pose).0
+    };
+    let recorded = (here(&[]), here(&[2.0, 1.5, 1.5]));
     let mut found = all_refined(starts, &[4.0, 4.0, 3.0, 3.0, 2.0, 2.0], 3);
     found.truncate(FINALISTS);
     let found = all_refined(found.into_iter().map(|f| f.0).collect(), &[3.0, 2.0, 1.5, 1.5, 1.5, 1.5], 1);
@@ -75,6 +82,7 @@ pub(super) fn align(source: &Scan, target: &Scan, freedom: Freedom, seed: u64) -
             share: 0.0,
             second: 1.0,
             rival: (0.0, 0.0),
+            recorded: recorded.0.max(recorded.1),
             centre: DVec3::ZERO,
         });
     };
@@ -87,6 +95,7 @@ pub(super) fn align(source: &Scan, target: &Scan, freedom: Freedom, seed: u64) -
         share,
         second: rival.map_or(0.0, |r| (r.1 / best.max(1e-9)).clamp(0.0, 1.0)),
         rival: rival.map_or((0.0, 0.0), |r| away(&r.0)),
+        recorded: recorded.0.max(recorded.1),
         centre: pose.apply(judges.0.points.iter().sum::<Vec3>().as_dvec3() / judges.0.points.len().max(1) as f64),
     })
 }

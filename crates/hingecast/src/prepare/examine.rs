@@ -1,0 +1,54 @@
+//! `check`, with what only a registration can tell: whether states that share little surface lie apart.
+
+use super::raw_depths::RawDepths;
+use super::words::failure;
+use crate::failure::{Failure, Result};
+use hingecast_capture::Recording;
+use hingecast_capture::check::{CheckReport, Severity, check as look_over};
+use hingecast_geom::Progress;
+use hingecast_prepare::register::Freedom;
+use std::path::Path;
+
+/// Name of the finding that a state has another frame than the others.
+const APART: &str = "states-apart";
+
+/// Looks over the recording at `path`.
+///
+/// # Errors
+/// The wish to stop.
+pub fn check(path: &Path, seed: u64, progress: &Progress) -> Result<CheckReport> {
+    let mut report = look_over(path, progress)?;
+    let suspects: Vec<usize> = report.findings.iter().filter(|f| f.code == APART).filter_map(|f| f.state).collect();
+    if suspects.is_empty() {
+        return Ok(report);
+    }
+    let Ok(recording) = Recording::open(path) else { return Ok(report) };
+    let up = Freedom::AboutUp(recording.up);
+    let mut depths = RawDepths::new(&recording);
+    match hingecast_prepare::apart(&mut depths, &suspects, up, seed, progress) {
+        Ok(apart) => {
+            report.findings.retain(|f| f.code != APART || f.state.is_some_and(|s| apart.contains(&s)));
+            for finding in report.findings.iter_mut().filter(|f| f.code == APART) {
+                finding.severity = Severity::Warning;
+                finding.hint = "nothing to do: `hingecast build` brings it to the others, or says what it lacks".into();
+            }
+            Ok(report)
+        }
+        Err(e @ hingecast_prepare::PrepareError::Cancelled(_)) => Err(failure(e, &recording)),
+        // What cannot be compared stays as it was found.
+        Err(_) => Ok(report),
+    }
+}
+
+/// What `build` asks first: whether states have to be brought together.
+///
+/// # Errors
+/// A finding that makes the build worthless, with the advice; the wish to stop.
+pub(crate) fn before_build(recording: &Recording, seed: u64, progress: &Progress) -> Result<bool> {
+    let report = check(&recording.root, seed, progress)?;
+    if let Some(f) = report.grave().next() {
+        let hint = format!("{}; `--force` builds all the same", f.hint);
+        return Err(Failure::new(f.what.clone(), f.place.clone(), hint));
+    }
+    Ok(report.findings.iter().any(|f| f.code == APART))
+}

@@ -1,0 +1,71 @@
+//! The object of a recording without masks.
+
+use super::raw_depths::RawDepths;
+use super::words::failure;
+use crate::failure::{Failure, Result};
+use glam::DVec2;
+use hingecast_capture::recording::images;
+use hingecast_capture::{Recording, Split};
+use hingecast_geom::Progress;
+use hingecast_prepare::{MaskReport, Wanted, object_masks};
+use std::path::Path;
+
+/// Finds the object and writes its masks into `folder`, one PNG a training frame, named as the
+/// colour image is; frames point there.
+///
+/// # Errors
+/// Nothing that moves, a picture that cannot be read or written, the wish to stop.
+pub fn find_masks(
+    recording: &mut Recording,
+    wanted: &Wanted,
+    folder: &Path,
+    seed: u64,
+    progress: &Progress,
+) -> Result<MaskReport> {
+    let mut depths = RawDepths::new(recording);
+    let found = object_masks(&mut depths, wanted, recording.up, seed, progress).map_err(|e| failure(e, recording))?;
+    for (state, masks) in found.masks.iter().enumerate() {
+        for (frame, mask) in recording.frames_of(state, Split::Train).into_iter().zip(masks) {
+            let path = folder.join(mask_name(recording, frame));
+            let camera = &recording.frames[frame].camera;
+            let bytes: Vec<u8> = mask.iter().map(|m| 255 * m).collect();
+            images::write_gray(&path, &bytes, camera.width, camera.height)?;
+            recording.frames[frame].mask = Some(path);
+        }
+    }
+    Ok(found.report)
+}
+
+/// The place that a pixel of a picture shows, world frame. `picture`: the end of its path.
+///
+/// # Errors
+/// No picture of that name, or more than one; a pixel outside it or without depth.
+pub fn place_at(recording: &Recording, picture: &str, pixel: [f64; 2]) -> Result<[f32; 3]> {
+    let of_name = |f: &&hingecast_capture::Frame| f.color.ends_with(picture) && f.split == Split::Train;
+    let place = || format!("--at {picture}:{},{}", pixel[0], pixel[1]);
+    let found: Vec<usize> = recording.frames.iter().enumerate().filter(|(_, f)| of_name(f)).map(|(i, _)| i).collect();
+    let [frame] = found[..] else {
+        let what = format!("{} training pictures have this name", found.len());
+        return Err(Failure::new(what, place(), "its name as in transforms.json: --at rgb/s000_v003.png:U,V"));
+    };
+    let view = recording.load(frame)?;
+    let [u, v] = pixel.map(|x| x.floor());
+    let (w, h) = (view.camera.width as f64, view.camera.height as f64);
+    if !(u >= 0.0 && v >= 0.0 && u < w && v < h) {
+        let hint = format!("pixels from the upper left corner; the picture has {w} x {h} of them");
+        return Err(Failure::new("the pixel is not in the picture", place(), hint));
+    }
+    let z = view.depth.get(v as usize * view.camera.width + u as usize).copied().unwrap_or(0.0);
+    if z <= 0.0 {
+        return Err(Failure::new("the pixel has no depth", place(), "take one beside it, in the middle of a surface"));
+    }
+    Ok(view.camera.unproject(DVec2::new(u + 0.5, v + 0.5), f64::from(z)).as_vec3().to_array())
+}
+
+/// `s003_v012.png`, which no two frames share.
+pub(super) fn mask_name(recording: &Recording, frame: usize) -> String {
+    let f = &recording.frames[frame];
+    let before = recording.frames[..frame].iter().filter(|o| (o.state, o.view) == (f.state, f.view)).count();
+    let more = if before > 0 { format!("_{before}") } else { String::new() };
+    format!("s{:03}_v{:03}{more}.png", f.state, f.view)
+}
