@@ -149,7 +149,7 @@ pub fn find(depths: &mut dyn Depths, config: &Config, progress: &Progress) -> Re
         (0..n_states).map(of_state).collect::<Result<_, _>>()?
     };
     let resampled = match noisy && config.resample && !estimate.tree.joints.is_empty() {
-        true => resample::deviations(depths, lattice, &estimate, config, progress)?,
+        true => resample::deviations(depths, lattice, &cameras, &estimate, seed, progress)?,
         false => Vec::new(),
     };
     let shown = shown(&evidence, &estimate.tree, &labels, &witnesses);

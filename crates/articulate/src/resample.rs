@@ -2,40 +2,39 @@
 //! camera's way, not a pixel. Stereo blotches, flying pixels and drift are shared by many samples; a
 //! covariance that counts samples is several times too sure.
 //!
-//! Delete-a-group jackknife (Kott 2001): the views of every state in as many stretches as there are
-//! groups; the joints are fitted anew without each stretch in turn, and var = (G - 1) / G sum of the squared
-//! deviations. With so few groups its own error is Student's: deviations are given such that twice the
+//! Delete-a-group jackknife (Kott 2001): the views of every state in groups of two stretches of the way, half
+//! of it apart, so that no side of the object goes with its group; the joints are fitted anew without each
+//! group in turn, and var = (G - 1) / G sum of the squared deviations. With so few groups its own error is Student's: deviations are given such that twice the
 //! answer holds 95 %.
 
-use crate::config::Config;
 use crate::depths::Depths;
 use crate::error::ArticulateError;
 use crate::model::estimate::{Discovery, Estimate};
-use crate::observe::cameras;
 use crate::observe::depth_view::DepthView;
 use crate::observe::evidence::Evidence;
 use crate::observe::lattice::Lattice;
 use crate::passes::driver::settle;
 use crate::passes::optional_names;
-use hingecast_geom::{Joint, KinematicTree, Progress};
+use hingecast_geom::{Joint, KinematicTree, Pose, Progress};
 
-/// Stretches of the way; with fewer views in a state nothing of it is left out.
+/// Groups of views; of a state with fewer views nothing is left out.
 const GROUPS: usize = 5;
 /// Student's 97.5 % quantile with GROUPS - 1 degrees of freedom, over that of the normal distribution.
 const FEW_GROUPS: f64 = 2.776 / 1.960;
 /// Passes that a resampled fit goes through: the tree stays as it was found.
-const FITS: [&str; 2] = ["align_states", "refine_joints"];
+const FITS: [&str; 3] = ["align_states", "refine_joints", "align_axes"];
 
 /// Standard deviations of every joint of `found`: axis (radians), pivot (scene units), value (mean over the
-/// states, radians or scene units). Empty where every state has too few views to leave some out.
+/// states, radians or scene units). `cameras`: as corrected, per state and view. Empty where every state has too few views to leave some out.
 ///
 /// # Errors
 /// A view that cannot be read, the wish to stop.
 pub fn deviations(
     depths: &mut dyn Depths,
     lattice: Lattice,
+    cameras: &[Vec<Pose>],
     found: &Estimate,
-    config: &Config,
+    seed: u64,
     progress: &Progress,
 ) -> Result<Vec<[f64; 3]>, ArticulateError> {
     let n_states = depths.n_states();
@@ -49,21 +48,19 @@ pub fn deviations(
             lattice,
             &mut |state| {
                 progress.check()?;
-                let (views, gone) = without(depths.views(state).map_err(ArticulateError::of_depths)?, group);
+                let mut views = depths.views(state).map_err(ArticulateError::of_depths)?;
+                views.iter_mut().zip(&cameras[state]).for_each(|(v, pose)| v.camera.camera_from_world = *pose);
+                let (views, gone) = without(views, group);
                 left_out += gone;
-                let mut views = views;
-                if config.align_cameras {
-                    cameras::align(&mut views, lattice.voxel, cameras::POINTS);
-                }
                 Ok(views)
             },
-            config.seed,
+            seed,
         )?;
         if left_out == 0 {
             return Ok(Vec::new());
         }
         let again = Discovery::again(&evidence, found.tree.clone(), found.cost);
-        let (_, other, _) = settle(evidence, again, config.seed, &skip);
+        let (_, other, _) = settle(evidence, again, seed, &skip);
         for (sum, squares) in sums.iter_mut().zip(apart(&found.tree, &other.tree)) {
             (0..3).for_each(|k| sum[k] += squares[k]);
         }
@@ -72,14 +69,18 @@ pub fn deviations(
     Ok(sums.into_iter().map(|s| s.map(|sum| FEW_GROUPS * (share * sum).sqrt())).collect())
 }
 
-/// The views but one stretch of them, and how many went.
+/// The views without a group, and how many went.
 fn without(views: Vec<DepthView>, group: usize) -> (Vec<DepthView>, usize) {
     let n = views.len();
     if n < GROUPS {
         return (views, 0);
     }
-    let kept: Vec<DepthView> =
-        views.into_iter().enumerate().filter(|(i, _)| i * GROUPS / n != group).map(|(_, view)| view).collect();
+    let kept: Vec<DepthView> = views
+        .into_iter()
+        .enumerate()
+        .filter(|(i, _)| i * 2 * GROUPS / n % GROUPS != group)
+        .map(|(_, view)| view)
+        .collect();
     let gone = n - kept.len();
     (kept, gone)
 }

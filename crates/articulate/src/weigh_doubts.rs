@@ -24,8 +24,8 @@ const PIECE_SHARE: f64 = 0.2;
 /// Pieces farther apart than one to two cells of this many voxels are separate.
 const GAP_VOXELS: f32 = 1.5;
 /// A motion is believed when no more speaks against it than this share of what speaks for it: real parts
-/// had 0.1 at most, phantoms 0.8 and more.
-const MOVES: f64 = 0.4;
+/// had 0.1 at most, phantoms 0.35 and more.
+const MOVES: f64 = 0.25;
 /// Share of samples that may stay unexplained silently.
 const UNEXPLAINED_SHARE: f64 = 0.005;
 /// Share of the part's samples that a state must confirm.

@@ -16,7 +16,7 @@ fn scans_with_a_world_each_and_no_masks_become_a_twin() {
     let built = hingecast(dir, "build rec -o run --preset fast").done();
     let said = built.stderr.clone();
     assert!(said.contains("brought into one frame") && said.contains("no masks"), "{said}");
-    assert!(said.contains("as a whole stood"), "the push is named: {said}");
+    assert!(said.contains("was taken to stand") && said.contains("brought back"), "the push is named: {said}");
     assert!(dir.join("run/prepare/masks.png").is_file());
     hingecast(dir, "eval run --truth rec.truth").done();
     let figures: serde_json::Value =

@@ -29,6 +29,10 @@ pub struct Scene {
     pub cells: usize,
     /// Standard deviation of a depth over that depth.
     pub noise: f64,
+    /// The same of what about ten pixels around share: stereo cameras match windows.
+    pub blotches: f64,
+    /// Of the noise.
+    pub seed: u64,
     /// Where the cameras of a state believe that the world is, per state; empty: where it is.
     pub believed_from_world: Vec<Pose>,
 }
@@ -43,7 +47,18 @@ impl Scene {
     pub fn new(boxes: Vec<Boxes>, tree: KinematicTree) -> Self {
         let n_states = tree.joints.first().map_or(3, |j| j.values.len());
         let believed_from_world = Vec::new();
-        Self { boxes, tree, n_states, size: 128, views: 24, cells: 80, noise: 0.0, believed_from_world }
+        Self {
+            boxes,
+            tree,
+            n_states,
+            size: 128,
+            views: 24,
+            cells: 80,
+            noise: 0.0,
+            blotches: 0.0,
+            seed: 0,
+            believed_from_world,
+        }
     }
 
     /// Coarser and quicker: 16 pictures of 96 x 96, 56 cells.
@@ -59,13 +74,19 @@ impl Scene {
     /// Looks for its parts, without the passes named in `skip`.
     pub fn find_without(&self, skip: &[&str]) -> Articulation {
         let skip = skip.iter().map(|name| name.to_string()).collect();
-        let config = Config { cells: self.cells, skip, ..Config::default() };
+        let config = Config { cells: self.cells, skip, resample: false, ..Config::default() };
         find(&mut self.clone(), &config, &Progress::default()).unwrap()
     }
 
     /// Looks for its parts with all passes.
     pub fn find(&self) -> Articulation {
         self.find_without(&[])
+    }
+
+    /// The same, and fitted anew without some of the views, to know how sure it is.
+    pub fn find_and_resample(&self) -> Articulation {
+        let config = Config { cells: self.cells, ..Config::default() };
+        find(&mut self.clone(), &config, &Progress::default()).unwrap()
     }
 
     /// What `find` gathers before it searches.
@@ -78,7 +99,7 @@ impl Scene {
     /// The views of one state.
     pub fn recorded(&self, state: usize) -> Vec<DepthView> {
         let parts: Vec<_> = self.boxes.iter().zip(self.tree.poses_at(state)).collect();
-        let mut rng = fastrand::Rng::with_seed(state as u64);
+        let mut rng = fastrand::Rng::with_seed(state as u64 + 1000 * self.seed);
         (0..self.views).map(|k| self.view(state, k, &parts, &mut rng)).collect()
     }
 
@@ -90,10 +111,12 @@ impl Scene {
         let size = self.size;
         let mut camera = Camera::look_at(eye, DVec3::new(0.0, 0.0, 0.2), DVec3::Z, size, size, 0.75);
         let (mut depth, mut class) = (vec![0.0; size * size], vec![BACKGROUND; size * size]);
+        let field = if self.blotches > 0.0 { smooth(size, rng) } else { vec![0.0; size * size] };
         for i in 0..size * size {
             let uv = DVec2::new((i % size) as f64 + 0.5, (i / size) as f64 + 0.5);
             if let Some(z) = hit(eye, camera.ray(uv), parts) {
-                (depth[i], class[i]) = ((z * (1.0 + self.noise * normal(rng))) as f32, OBJECT);
+                (depth[i], class[i]) =
+                    ((z * (1.0 + self.noise * normal(rng) + self.blotches * field[i])) as f32, OBJECT);
             }
         }
         if let Some(believed) = self.believed_from_world.get(state) {
@@ -115,6 +138,21 @@ impl Depths for Scene {
     fn views(&mut self, state: usize) -> Result<Vec<DepthView>, DepthError> {
         Ok(self.recorded(state))
     }
+}
+
+/// A random field of variance 1 or a little less, alike over about ten pixels.
+fn smooth(size: usize, rng: &mut fastrand::Rng) -> Vec<f64> {
+    const STEP: usize = 9;
+    let across = size / STEP + 2;
+    let knots: Vec<f64> = (0..across * across).map(|_| normal(rng)).collect();
+    let at = |i: usize| {
+        let (x, y) = ((i % size) as f64 / STEP as f64, (i / size) as f64 / STEP as f64);
+        let (u, v) = (x.fract(), y.fract());
+        let k = y as usize * across + x as usize;
+        (1.0 - v) * ((1.0 - u) * knots[k] + u * knots[k + 1])
+            + v * ((1.0 - u) * knots[k + across] + u * knots[k + across + 1])
+    };
+    (0..size * size).map(at).collect()
 }
 
 /// Depth along a ray of the nearest box; None = background.

@@ -60,6 +60,8 @@ pub(super) fn nothing_moves(recording: &Recording, looks: &[Option<Look>], by_st
     let mut finding = warning("nothing-moves", what, recording.root.display().to_string(), hint);
     if most < noise + NOTHING {
         finding.severity = Severity::Error;
+        finding.hint =
+            "move every part between the states, by more than the sensor's errors; or is it one scan, split?".into();
     }
     Some(finding)
 }

@@ -225,7 +225,7 @@ fn states_apart(recording: &Recording, looks: &[Option<Look>], by_state: &[Vec<u
                 100.0 * best,
                 100.0 * own
             );
-            let hint = "register all states together (one reconstruction over all pictures), then export again";
+            let hint = "register all states in one reconstruction; or scan with floor and wall in view and `hingecast import` one scan a state";
             let mut finding = error("states-apart", CaptureError::new(what, place, hint));
             finding.state = Some(s);
             // With two states nothing tells a registration that failed from an object of which most

@@ -27,10 +27,15 @@ pub fn check(path: &Path, seed: u64, progress: &Progress) -> Result<CheckReport>
     let mut depths = RawDepths::new(&recording);
     match hingecast_prepare::apart(&mut depths, &suspects, up, seed, progress) {
         Ok(apart) => {
-            report.findings.retain(|f| f.code != APART || f.state.is_some_and(|s| apart.contains(&s)));
+            let clear = |state: Option<usize>| apart.iter().find(|(s, _)| Some(*s) == state).map(|(_, clear)| *clear);
+            report.findings.retain(|f| f.code != APART || clear(f.state).is_some());
             for finding in report.findings.iter_mut().filter(|f| f.code == APART) {
-                finding.severity = Severity::Warning;
-                finding.hint = "nothing to do: `hingecast build` brings it to the others, or says what it lacks".into();
+                if clear(finding.state) == Some(true) {
+                    finding.severity = Severity::Warning;
+                    finding.hint = "nothing to do: `hingecast build` brings it to the others".into();
+                } else {
+                    finding.severity = Severity::Error;
+                }
             }
             Ok(report)
         }
@@ -50,5 +55,5 @@ pub(crate) fn before_build(recording: &Recording, seed: u64, progress: &Progress
         let hint = format!("{}; `--force` builds all the same", f.hint);
         return Err(Failure::new(f.what.clone(), f.place.clone(), hint));
     }
-    Ok(report.findings.iter().any(|f| f.code == APART))
+    Ok(report.findings.iter().any(|f| f.code == APART && f.severity == Severity::Warning))
 }

@@ -11,8 +11,8 @@ const BETTER: f64 = 1.25;
 /// States that one is compared with.
 const COMPARED: usize = 3;
 
-/// Those of `suspects` that fit the other states clearly better elsewhere than where they were recorded.
-/// Views' pixels of class `OBJECT` count.
+/// Those of `suspects` that fit the other states clearly better elsewhere than where they were recorded, each
+/// with whether it is clear where. Views' pixels of class `OBJECT` count.
 ///
 /// # Errors
 /// A state without surface, a view that cannot be read, the wish to stop.
@@ -22,7 +22,7 @@ pub fn apart(
     freedom: Freedom,
     seed: u64,
     progress: &Progress,
-) -> Result<Vec<usize>, PrepareError> {
+) -> Result<Vec<(usize, bool)>, PrepareError> {
     let n = depths.n_states();
     let mut out = Vec::new();
     for (k, &state) in suspects.iter().enumerate() {
@@ -38,8 +38,8 @@ pub fn apart(
             here |= !better;
             elsewhere |= better && placed.share >= AGREES && placed.second <= SECOND;
         }
-        if elsewhere && !here {
-            out.push(state);
+        if !here {
+            out.push((state, elsewhere));
         }
     }
     Ok(out)
