@@ -207,6 +207,10 @@ pub struct ImportObject {
 pub struct Check {
     /// Recording folder (the one that holds transforms.json).
     pub recording: PathBuf,
+    /// Page to write: findings, pictures with their masks, the states over each other from above. Its
+    /// contact sheet lies beside it.
+    #[arg(long, short, value_name = "PAGE.html")]
+    pub out: Option<PathBuf>,
     /// Repair what is safe: the old transforms.json is kept beside the new one.
     #[arg(long)]
     pub fix: bool,

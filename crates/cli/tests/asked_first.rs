@@ -25,6 +25,14 @@ fn a_build_stops_at_what_makes_it_vain() {
         }
     });
     hingecast(dir, "build rec -o run -q").refused("depth is in the wrong unit", "depth_unit_scale_factor");
+    // The same on a page, which takes no other file's place.
+    assert_eq!(hingecast(dir, "check rec -o look.html -q").code, Some(1));
+    let page = fs::read_to_string(dir.join("look.html")).unwrap();
+    assert!(page.contains("depth is in the wrong unit") && page.contains("From above"), "{page}");
+    assert!(dir.join("look.png").is_file() && page.contains("look.png"));
+    hingecast(dir, "check rec -o rec/transforms.json -q").refused("does not end in .html", "transforms.json");
+    fs::write(dir.join("mine.html"), "<p>years").unwrap();
+    hingecast(dir, "check rec -o mine.html -q").refused("no page of check", "mine.html");
     let line = "synth hinged_box -o still --states 3 --views 10 --test-views 0 --size 80 --range lid_hinge=0:0 -q";
     hingecast(dir, line).done();
     hingecast(dir, "build still -o run -q").refused("nothing moves between the states", "still");

@@ -79,8 +79,8 @@ impl RunFolder {
         let hint = "give a new folder: hingecast build RECORDING -o RUN";
         let damaged = root.join("run.json");
         if damaged.is_file() {
-            let hint = "put the file back, or give a new folder";
-            return Err(Failure::new("not a run's: run.json is damaged", damaged.display().to_string(), hint));
+            let what = "the run folder holds something else: its run.json is none of ours, or damaged";
+            return Err(Failure::new(what, damaged.display().to_string(), hint));
         }
         Err(Failure::new("the run folder holds something else", root.display().to_string(), hint))
     }

@@ -13,6 +13,8 @@ const IN_FRONT: f64 = 0.015;
 /// many times what a state contradicts itself, shows no motion. Share of the points.
 const MOVES: f64 = 0.004;
 const NOISE: f64 = 1.5;
+/// Fewer points of a state tell nothing.
+const FEW: usize = 50;
 /// With no more than this beyond what a state contradicts itself, not even something small moves.
 const NOTHING: f64 = 2e-4;
 
@@ -26,7 +28,8 @@ pub(super) fn nothing_moves(recording: &Recording, looks: &[Option<Look>], by_st
     let clouds: Vec<_> = (0..n).map(cloud).collect();
     let all = clouds.iter().flatten().flat_map(|(_, x)| x);
     let (lo, hi) = all.fold((DVec3::INFINITY, DVec3::NEG_INFINITY), |(l, h), &x| (l.min(x), h.max(x)));
-    if n < 2 || clouds.iter().any(|c| c.len() < 2) {
+    let few = |c: &Vec<(usize, Vec<DVec3>)>| c.len() < 2 || c.iter().map(|(_, x)| x.len()).sum::<usize>() < FEW;
+    if n < 2 || clouds.iter().any(few) {
         return None;
     }
     let tolerance = IN_FRONT * (hi - lo).length();

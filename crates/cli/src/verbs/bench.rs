@@ -71,7 +71,8 @@ pub fn run(session: &Session, args: &Bench) -> Result<Outcome> {
 /// The table of an earlier bench.
 fn earlier(file: &Path) -> Result<Vec<Evaluation>> {
     let hint = "give the bench.json of an earlier bench";
-    let text = std::fs::read(file).map_err(|e| Failure::new(e.to_string(), file.display().to_string(), hint))?;
+    let text = std::fs::read(file)
+        .map_err(|e| Failure::new(format!("cannot read the table: {e}"), file.display().to_string(), hint))?;
     serde_json::from_slice(&text)
         .map_err(|e| Failure::new(format!("not a table of a bench: {e}"), file.display().to_string(), hint))
 }

@@ -2,8 +2,8 @@
 
 use super::{Outcome, Session};
 use crate::cli::Check;
-use hingecast::failure::Result;
-use hingecast::prepare::check;
+use hingecast::failure::{Failure, Result};
+use hingecast::prepare::{check, write_page};
 use hingecast_capture::check::{StateFrames, fix};
 
 pub fn run(session: &Session, args: &Check) -> Result<Outcome> {
@@ -24,6 +24,22 @@ pub fn run(session: &Session, args: &Check) -> Result<Outcome> {
     }
     if report.findings.is_empty() {
         session.ui.say("nothing wrong was found");
+    }
+    if let Some(page) = &args.out {
+        if page.extension().is_none_or(|e| e != "html") {
+            let hint = "a page: -o check.html";
+            return Err(Failure::new("the page's name does not end in .html", page.display().to_string(), hint));
+        }
+        // One of ours, or a new one: what else is there is nobody's to write over.
+        for file in [page.clone(), page.with_extension("png")] {
+            let ours = std::fs::read_to_string(page).is_ok_and(|text| text.contains("<title>check "));
+            if file.exists() && !ours {
+                let what = "a file of this name is there, and no page of check";
+                return Err(Failure::new(what, file.display().to_string(), "another name: -o PAGE.html"));
+            }
+        }
+        write_page(&args.recording, &report, page)?;
+        session.ui.say(&format!("look: {}", page.display()));
     }
     session
         .answer(&serde_json::json!({ "findings": report.findings, "states": report.states, "repaired": repaired }))?;

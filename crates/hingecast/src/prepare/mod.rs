@@ -6,6 +6,7 @@
 
 mod examine;
 mod masks;
+mod page;
 mod raw_depths;
 mod sheet;
 mod words;
@@ -28,6 +29,7 @@ use words::failure;
 pub use examine::check;
 pub use hingecast_prepare::Wanted;
 pub use masks::{find_masks, place_at};
+pub use page::write_page;
 pub use sheet::contact_sheet;
 pub use words::sentence;
 
