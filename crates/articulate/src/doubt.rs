@@ -29,6 +29,13 @@ pub enum Doubt {
         /// The same where it is said to be, and where its own state measured it.
         moved: f64,
     },
+    /// Views of some states contradict the joint's value there.
+    Contradicted {
+        /// Name of the joint.
+        joint: String,
+        /// Indices of the states.
+        states: Vec<usize>,
+    },
     /// The axis may point elsewhere.
     LooseAxis {
         /// Name of the joint.
@@ -97,6 +104,7 @@ impl Doubt {
         match self {
             Self::Undecidable { joint, .. }
             | Self::MayNotMove { joint, .. }
+            | Self::Contradicted { joint, .. }
             | Self::LooseAxis { joint, .. }
             | Self::LoosePivot { joint, .. }
             | Self::MayFollow { joint, .. }
@@ -117,6 +125,7 @@ impl Doubt {
         match &mut self {
             Self::Undecidable { joint, .. }
             | Self::MayNotMove { joint, .. }
+            | Self::Contradicted { joint, .. }
             | Self::LooseAxis { joint, .. }
             | Self::LoosePivot { joint, .. }
             | Self::MayFollow { joint, .. }
@@ -148,6 +157,12 @@ impl fmt::Display for Doubt {
                  drift, look like that",
                 100.0 * at_rest,
                 100.0 * moved
+            ),
+            Self::Contradicted { joint, states } => write!(
+                f,
+                "joint '{joint}': its value in state{} {} is contradicted: cameras look through where its part is said to be",
+                if states.len() == 1 { "" } else { "s" },
+                listed(states)
             ),
             Self::LooseAxis { joint, deg } => {
                 write!(f, "joint '{joint}': the depth says where its axis points only to {deg:.1} deg")

@@ -55,9 +55,13 @@ pub fn weigh_doubts(
     }
     for (j, joint) in tree.joints.iter().enumerate() {
         let name = || joint.name.clone();
-        let Shown { at_rest, moved, own, .. } = believed.shown[j];
+        let Shown { at_rest, moved, own, .. } = &believed.shown[j];
         if believed.shown[j].against() > MOVES {
-            out.push(Doubt::MayNotMove { joint: name(), at_rest, moved: moved.max(own) });
+            out.push(Doubt::MayNotMove { joint: name(), at_rest: *at_rest, moved: moved.max(*own) });
+        }
+        let states = believed.shown[j].contradicted.clone();
+        if !states.is_empty() {
+            out.push(Doubt::Contradicted { joint: name(), states });
         }
         let members = found.owners.members(evidence, joint.child);
         let (rival, nats) = rival(evidence, tree, j, &members, seed);
