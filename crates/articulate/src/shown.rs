@@ -29,6 +29,7 @@ const SLACK: f32 = 0.75;
 
 /// How views judge a joint's part: shares of the places that they can judge which they look through.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(default)]
 pub struct Shown {
     /// Where the part would be in other states had it not moved.
     pub at_rest: f64,

@@ -11,7 +11,7 @@ use hingecast_study::simulate::record::{self, WorldArgs};
 use hingecast_study::simulate::teleop::session::Session as TeleopSession;
 use hingecast_study::simulate::teleop::terminal::{self, Console};
 use hingecast_study::simulate::teleop::{self, Wanted};
-use hingecast_study::simulate::{imported_beside, may_write, object_file, replay, twin_file};
+use hingecast_study::simulate::{imported_beside, may_replace, may_write, object_file, replay, twin_file};
 use std::path::{Path, PathBuf};
 
 pub fn run(session: &Session, args: &Demos) -> Result<Outcome> {
@@ -34,6 +34,7 @@ pub fn run(session: &Session, args: &Demos) -> Result<Outcome> {
     if args.expert == "teleop" {
         return teleoperate(session, args, out, object, kind);
     }
+    may_replace(out)?;
     let start = std::time::Instant::now();
     let task = new_task(session, args, &object, kind)?;
     let (demos, recorded) = record::record_on(&object, &task, args.n, args.seed, &session.ui.stage("demos"))?;

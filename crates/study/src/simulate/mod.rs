@@ -60,12 +60,19 @@ fn absolute(path: &Path) -> Result<PathBuf> {
     path.canonicalize().map_err(Failure::io(path))
 }
 
-/// A file of demonstrations that cannot be written is noticed before the work and not after it.
+/// A folder in which `file` cannot be written is noticed before the work and not after it.
 ///
 /// # Errors
-/// When the folder refuses, or a file of that name is there that holds anything but demonstrations of
-/// ours.
+/// When it cannot.
 pub fn may_write(file: &Path) -> Result<()> {
+    hingecast_geom::staging::probe(file).map_err(Failure::io(file))
+}
+
+/// Whether demonstrations may take the place of `file`: it is new, or demonstrations of ours.
+///
+/// # Errors
+/// Something else is there.
+pub fn may_replace(file: &Path) -> Result<()> {
     let ours = || {
         let demos = hingecast_policy::demos::read(file).ok()?;
         Some(demos.env_args["env_name"].as_str()?.starts_with(record::ENV_NAME))
@@ -74,7 +81,7 @@ pub fn may_write(file: &Path) -> Result<()> {
         let what = "a file of this name is there, and not demonstrations that hingecast recorded";
         return Err(Failure::new(what, file.display().to_string(), "another name: -o FILE.hdf5"));
     }
-    hingecast_geom::staging::probe(file).map_err(Failure::io(file))
+    Ok(())
 }
 
 /// A factor as people write it: six digits at most, without what powers of two add to them.
