@@ -22,7 +22,7 @@ const FEW: usize = 15;
 const APART: f32 = 3.0;
 /// A state's value is wrong when in its pairs views look through so much of where the part is said to be, and
 /// so many times what they do in the others.
-const CONTRADICTED: f64 = 0.2;
+const CONTRADICTED: f64 = 0.08;
 const CLEARLY: f64 = 4.0;
 /// What is off by less may be depth's own error: voxels.
 const SLACK: f32 = 0.75;
