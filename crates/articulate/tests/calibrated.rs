@@ -6,7 +6,7 @@ use common::objects::cupboard_open_by;
 use common::truth::{Off, nearest};
 
 /// Of 95 % intervals of axis, pivot and values, so many hold the truth; twice the standard deviation is the
-/// interval. Counted as independent samples, the same noise gives intervals that hold it in a third.
+/// interval.
 #[test]
 fn intervals_hold_the_truth_about_as_often_as_they_say() {
     let (mut held, mut all) = (0, 0);

@@ -44,7 +44,7 @@ pub fn write_page(recording: &Path, report: &CheckReport, page: &Path) -> Result
             s.state, s.usable, s.partly_hidden, s.occluded, s.test
         );
     }
-    let _ = write!(out, "</table></html>\n");
+    let _ = writeln!(out, "</table></html>");
     write_whole(page, out.as_bytes()).map_err(Failure::io(page))
 }
 
