@@ -2,7 +2,7 @@
 
 mod common;
 
-use common::{TINY, files, hingecast, tiny_recording};
+use common::{ROOM, TINY, files, hingecast, tiny_recording};
 use std::fs;
 use std::path::Path;
 
@@ -46,8 +46,7 @@ fn a_build_stops_at_what_makes_it_vain() {
 fn states_that_lie_apart_are_brought_back_and_others_left_alone() {
     let dir = tempfile::tempdir().unwrap();
     let dir = dir.path();
-    let room = "--camera 160,120,132,132,80,60 --scene room --masks none --trajectory walk";
-    hingecast(dir, &format!("synth microwave -o rec --states 4 --views 14 --test-views 0 {room} -q")).done();
+    hingecast(dir, &format!("synth microwave -o rec --states 4 --views 14 {ROOM} -q")).done();
     let built = hingecast(dir, "build rec -o run --preset fast --to parts").done();
     assert!(!built.stderr.contains("brought into one frame"), "{built}");
     let tree = |run: &str| -> serde_json::Value {
@@ -128,8 +127,7 @@ fn what_is_there_is_no_place_for_answers() {
 fn masks_by_a_box_or_a_pixel() {
     let dir = tempfile::tempdir().unwrap();
     let dir = dir.path();
-    let line = "synth microwave -o rec --states 2 --views 10 --test-views 0 --camera 160,120,132,132,80,60 --scene room --masks none --trajectory walk --range door_hinge=0:0 -q";
-    hingecast(dir, line).done();
+    hingecast(dir, &format!("synth microwave -o rec --states 2 --views 10 {ROOM} --range door_hinge=0:0 -q")).done();
     hingecast(dir, "mask rec -q").refused("nothing moves", "rec");
     hingecast(dir, "mask rec --box 1,2,3 -q").refused("not understood", "--box 1,2,3");
     hingecast(dir, "mask rec --at rgb/s000_v000.png:9000,1 -q").refused("the pixel is not in the picture", "--at");

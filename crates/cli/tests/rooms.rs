@@ -2,14 +2,13 @@
 
 mod common;
 
-use common::hingecast;
+use common::{ROOM, hingecast};
 
 #[test]
 fn scans_with_a_world_each_and_no_masks_become_a_twin() {
     let dir = tempfile::tempdir().unwrap();
     let dir = dir.path();
-    let room = "--states 5 --views 14 --test-views 0 --camera 160,120,132,132,80,60 --scene room --masks none --trajectory walk";
-    hingecast(dir, &format!("synth microwave -o rec {room} --frames per-state --push 40")).done();
+    hingecast(dir, &format!("synth microwave -o rec --states 5 --views 14 {ROOM} --frames per-state --push 40")).done();
     let json: serde_json::Value =
         serde_json::from_slice(&std::fs::read(dir.join("rec/transforms.json")).unwrap()).unwrap();
     assert_eq!(json["registered"], false);

@@ -34,11 +34,13 @@ impl Lattice {
         self.len() == 0
     }
 
-    pub(super) fn cell(&self, x: Vec3) -> IVec3 {
+    /// The cell that holds `x`, which may be outside.
+    pub fn cell(&self, x: Vec3) -> IVec3 {
         ((x - self.lo) * self.per_voxel).floor().as_ivec3()
     }
 
-    pub(super) fn index_of(&self, c: IVec3) -> Option<usize> {
+    /// Index of a cell; `None` outside.
+    pub fn index_of(&self, c: IVec3) -> Option<usize> {
         let inside = c.cmpge(IVec3::ZERO).all() && c.cmplt(self.size).all();
         inside.then(|| ((c.z * self.size.y + c.y) * self.size.x + c.x) as usize)
     }
@@ -63,7 +65,14 @@ impl Lattice {
         }
     }
 
-    pub(super) fn centre(&self, c: IVec3) -> Vec3 {
+    /// The cell of an index.
+    pub fn coords(&self, index: usize) -> IVec3 {
+        let (i, size) = (index as i32, self.size);
+        IVec3::new(i % size.x, i / size.x % size.y, i / (size.x * size.y))
+    }
+
+    /// The middle of a cell, world frame.
+    pub fn centre(&self, c: IVec3) -> Vec3 {
         self.lo + (c.as_vec3() + 0.5) * self.voxel
     }
 }

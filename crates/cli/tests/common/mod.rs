@@ -95,6 +95,9 @@ pub fn tiny_recording(dir: &Path) -> PathBuf {
 pub const TINY: &str = "--set fit.steps=120 --set fit.gaussians=2000 --set track.steps=30 --set parts.sample=400 \
                         --set twin.voxel=0.012 --set twin.max_hulls=8";
 
+/// Flags of `synth`: a small picture of an object in a room, as people scan it.
+pub const ROOM: &str = "--test-views 0 --camera 160,120,132,132,80,60 --scene room --masks none --trajectory walk";
+
 /// All files below `folder`, as sorted relative paths.
 pub fn files(folder: &Path) -> Vec<PathBuf> {
     fn walk(at: &Path, root: &Path, out: &mut Vec<PathBuf>) {

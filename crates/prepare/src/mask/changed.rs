@@ -30,10 +30,10 @@ pub(super) fn moved(clouds: &[Cloud], witnesses: &[Vec<Witness>], lattice: &Latt
             let raw: Vec<bool> = cloud.points.par_iter().map(|x| free(*x)).collect();
             let mut cells: HashMap<IVec3, usize> = HashMap::new();
             for (x, _) in cloud.points.iter().zip(&raw).filter(|(_, m)| **m) {
-                *cells.entry(super::cell(lattice, *x)).or_default() += 1;
+                *cells.entry(lattice.cell(*x)).or_default() += 1;
             }
             let company = |i: usize| {
-                let at = super::cell(lattice, cloud.points[i]);
+                let at = lattice.cell(cloud.points[i]);
                 let around = (0..27).map(|k| at + IVec3::new(k % 3 - 1, k / 3 % 3 - 1, k / 9 - 1));
                 around.filter_map(|c| cells.get(&c)).sum::<usize>() >= COMPANY
             };

@@ -12,7 +12,7 @@ mod planes;
 
 use crate::error::PrepareError;
 use crate::scan::chosen;
-use glam::{DMat3, DVec3, IVec3, Vec3};
+use glam::{DMat3, DVec3, Vec3};
 use hingecast_articulate::observe::cloud::{Cloud, gather};
 use hingecast_articulate::observe::lattice::Lattice;
 use hingecast_articulate::observe::witness::Witness;
@@ -194,9 +194,4 @@ pub(crate) fn place(view: &DepthView, rot: &glam::Mat3, trans: Vec3, i: usize) -
     let (u, v) = ((i % w) as f32 + 0.5, (i / w) as f32 + 0.5);
     let ray = Vec3::new((u - c.cx as f32) / c.fx as f32, (v - c.cy as f32) / c.fy as f32, 1.0);
     Some(*rot * (ray * view.depth[i]) + trans)
-}
-
-/// Cell coordinates of a place in a lattice.
-pub(crate) fn cell(lattice: &Lattice, x: Vec3) -> IVec3 {
-    ((x - lattice.lo) / lattice.voxel).floor().as_ivec3()
 }

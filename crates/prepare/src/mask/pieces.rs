@@ -1,7 +1,7 @@
 //! What is left without the room's planes, in pieces that do not touch each other.
 
 use super::planes::Plane;
-use super::{Room, cell, place};
+use super::{Room, place};
 use glam::{IVec3, Vec3};
 use hingecast_articulate::DepthView;
 use hingecast_articulate::observe::lattice::Lattice;
@@ -66,12 +66,9 @@ impl Pieces {
                 }
             }
         }
-        let (size, voxel) = (self.lattice.size, self.lattice.voxel);
         let believed = own.into_par_iter().filter(|(c, (_, seen_by))| {
-            let k = *c as i32;
-            let at = IVec3::new(k % size.x, k / size.x % size.y, k / (size.x * size.y)).as_vec3();
-            let middle = self.lattice.lo + (at + 0.5) * voxel;
-            let (through, on) = counted(&witnesses, middle, voxel);
+            let middle = self.lattice.centre(self.lattice.coords(*c));
+            let (through, on) = counted(&witnesses, middle, self.lattice.voxel);
             // What one camera alone has a little in front of a wall is a camera's error.
             let seen = f64::from(seen_by.count_ones()) >= SEEN * (on + through) as f64;
             on >= through && (seen || supports.iter().all(|p| p.height(middle) > CLOSE * p.widest()))
@@ -83,7 +80,7 @@ impl Pieces {
 
     /// Everything in a box that is not the room's; `None` where nothing is.
     pub fn inside(&self, lo: Vec3, hi: Vec3) -> Option<Object> {
-        let middle = |i: usize| self.lattice.lo + (self.coords(i).as_vec3() + 0.5) * self.lattice.voxel;
+        let middle = |i: usize| self.lattice.centre(self.lattice.coords(i));
         let own = |i: usize| self.counts[i] > 0 && middle(i).cmpge(lo).all() && middle(i).cmple(hi).all();
         let cells: Vec<bool> = (0..self.counts.len()).map(own).collect();
         cells.contains(&true).then_some(Object { lattice: self.lattice, cells })
@@ -92,8 +89,8 @@ impl Pieces {
     /// The piece at a place, or nearest to it within a few cells.
     pub fn at(&self, x: Vec3) -> Option<Object> {
         let (piece, count) = self.pieces();
-        let at = cell(&self.lattice, x);
-        let away = |i: &usize| (self.coords(*i) - at).length_squared();
+        let at = self.lattice.cell(x);
+        let away = |i: &usize| (self.lattice.coords(*i) - at).length_squared();
         let near = (0..piece.len()).filter(|i| piece[*i] > 0).min_by_key(away)?;
         if away(&near) > NAMED_PLACE * NAMED_PLACE {
             return None;
@@ -129,19 +126,8 @@ impl Pieces {
         (self.grown(&piece, &own), on as f64 / all.max(1) as f64)
     }
 
-    fn index(&self, c: IVec3) -> usize {
-        let size = self.lattice.size;
-        ((c.z * size.y + c.y) * size.x + c.x) as usize
-    }
-
-    fn coords(&self, i: usize) -> IVec3 {
-        let (i, size) = (i as i32, self.lattice.size);
-        IVec3::new(i % size.x, i / size.x % size.y, i / (size.x * size.y))
-    }
-
     /// The piece of every cell, from 1, 0 where nothing is; and how many there are.
     fn pieces(&self) -> (Vec<u32>, u32) {
-        let size = self.lattice.size;
         let full = |i: usize| self.counts[i] >= PIXELS;
         let mut piece = vec![0u32; self.counts.len()];
         let mut count = 0;
@@ -153,12 +139,12 @@ impl Pieces {
             piece[start] = count;
             let mut open = vec![start];
             while let Some(i) = open.pop() {
-                let at = self.coords(i);
-                let (lo, hi) = ((at - TOUCH).max(IVec3::ZERO), (at + TOUCH).min(size - IVec3::ONE));
+                let at = self.lattice.coords(i);
+                let (lo, hi) = (at - TOUCH, at + TOUCH);
                 for z in lo.z..=hi.z {
                     for y in lo.y..=hi.y {
                         for x in lo.x..=hi.x {
-                            let j = self.index(IVec3::new(x, y, z));
+                            let Some(j) = self.lattice.index_of(IVec3::new(x, y, z)) else { continue };
                             if piece[j] == 0 && full(j) {
                                 piece[j] = count;
                                 open.push(j);
@@ -173,13 +159,11 @@ impl Pieces {
 
     /// The cells of some pieces.
     fn grown(&self, piece: &[u32], own: &[bool]) -> Object {
-        let size = self.lattice.size;
         // Cells that few pixels hit - a door seen slantwise - go with those around them.
         let around = |i: usize| {
-            let at = self.coords(i);
+            let at = self.lattice.coords(i);
             let near = (0..27).map(|k| at + IVec3::new(k % 3 - 1, k / 3 % 3 - 1, k / 9 - 1));
-            let inside = near.filter(|c| c.cmpge(IVec3::ZERO).all() && c.cmplt(size).all());
-            inside.into_iter().any(|c| own[piece[self.index(c)] as usize])
+            near.into_iter().filter_map(|c| self.lattice.index_of(c)).any(|j| own[piece[j] as usize])
         };
         let is_own = |i: usize| own[piece[i] as usize] || (piece[i] == 0 && self.counts[i] > 0 && around(i));
         let cells = (0..piece.len()).map(is_own).collect();
@@ -207,15 +191,13 @@ impl Object {
 
     /// Lowest and highest corner.
     pub fn bounds(&self) -> (Vec3, Vec3) {
-        let size = self.lattice.size;
         let (mut lo, mut hi) = (Vec3::INFINITY, Vec3::NEG_INFINITY);
         for i in (0..self.cells.len()).filter(|&i| self.cells[i]) {
-            let k = i as i32;
-            let at = IVec3::new(k % size.x, k / size.x % size.y, k / (size.x * size.y)).as_vec3();
+            let at = self.lattice.coords(i).as_vec3();
             lo = lo.min(self.lattice.lo + at * self.lattice.voxel);
             hi = hi.max(self.lattice.lo + (at + Vec3::ONE) * self.lattice.voxel);
         }
-        debug_assert!(cell(&self.lattice, lo).min_element() >= 0 || !lo.is_finite());
+        debug_assert!(self.lattice.cell(lo).min_element() >= 0 || !lo.is_finite());
         (lo, hi)
     }
 }
