@@ -154,6 +154,14 @@ pub struct SynthSettings {
     /// little else are marked.
     #[arg(long, conflicts_with = "occluders")]
     pub play: bool,
+    /// A film: `OUT/scan`, a walk around the object of --views pictures, and `OUT/play`, one video in
+    /// which hands move the joints while the camera moves, as an app leaves them: no masks, no
+    /// states. `hingecast import OUT/scan --film OUT/play` takes them.
+    #[arg(long, conflicts_with_all = ["occluders", "play", "states", "test_views", "masks", "trajectory", "push"])]
+    pub film: bool,
+    /// Pictures of the play of a film, ten a second.
+    #[arg(long, default_value_t = 150, value_name = "N", requires = "film")]
+    pub play_frames: usize,
     /// First and last value of a joint, radians (hinge) or scene units (slide); may be repeated
     /// [default: what it can do].
     #[arg(long = "range", value_name = "JOINT=FROM:TO")]
