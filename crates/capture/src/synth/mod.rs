@@ -68,13 +68,10 @@ pub fn synth(
     let truth_work = config.truth.then(|| Staging::new(&truth_out)).transpose()?;
     let film = config.film.is_some();
     let hands = config.play || config.occluders > 0.0;
-    let folders = [
-        ("rgb", true),
-        ("depth", true),
-        ("mask", config.world.masks != Masks::None),
-        ("occluder", hands && !film),
-    ];
-    for (capture, (folder, _)) in captures(film).iter().flat_map(|c| folders.iter().filter(|f| f.1).map(move |f| (c, f)))
+    let folders =
+        [("rgb", true), ("depth", true), ("mask", config.world.masks != Masks::None), ("occluder", hands && !film)];
+    for (capture, (folder, _)) in
+        captures(film).iter().flat_map(|c| folders.iter().filter(|f| f.1).map(move |f| (c, f)))
     {
         work.folder(&format!("{capture}{folder}"))?;
     }
@@ -100,7 +97,11 @@ pub fn synth(
         object,
         config,
         states: &states,
-        held: if config.play { player::hold(object, &states[..config.states], film, metres_per_unit) } else { Vec::new() },
+        held: if config.play {
+            player::hold(object, &states[..config.states], film, metres_per_unit)
+        } else {
+            Vec::new()
+        },
         background: Vec3::from_array(
             config.background.map(|c| crate::object::texture::linear_from_srgb(f32::from(c) / 255.0)),
         ),
@@ -130,6 +131,7 @@ pub fn synth(
         n_states: if film { 1 } else { config.states },
         metric: object.metric,
         up: DVec3::Z,
+        film: false,
         registered: film || config.world.frames == Frames::Shared,
     };
     if film {
