@@ -7,8 +7,8 @@
 
 use crate::error::PrepareError;
 use glam::{Mat3, Vec3};
-use hingecast_articulate::observe::witness::{VIEWS, Witness, counted};
-use hingecast_articulate::{Articulation, DepthView, Depths, OBJECT};
+use hingecast_articulate::observe::witness::{Witness, counted};
+use hingecast_articulate::{Articulation, DepthView, Depths, OBJECT, OTHER};
 use hingecast_geom::{Pose, Progress};
 use rayon::prelude::*;
 
@@ -37,7 +37,7 @@ pub struct Hands {
     pub phantoms: usize,
 }
 
-/// Pixels of class `OBJECT` in states 1.. that no part of `found` explains; state 0 is the scan.
+/// Pixels with depth in states 1.. that no part of `found` explains; state 0 is the scan.
 ///
 /// # Errors
 /// A view that cannot be read, the wish to stop.
@@ -84,13 +84,16 @@ fn of_view(view: &DepthView, back: &[Pose], witnesses: &[Witness]) -> Vec<u8> {
     let world_from_camera = view.camera.camera_from_world.inverse();
     let (rot, trans) = (world_from_camera.mat3().as_mat3(), world_from_camera.trans.as_vec3());
     let back: Vec<(Mat3, Vec3)> = back.iter().map(|p| (p.mat3().as_mat3(), p.trans.as_vec3())).collect();
+    let measured = |c: &u8| if *c == OTHER { OBJECT } else { *c };
+    let all = DepthView { class: view.class.iter().map(measured).collect(), ..view.clone() };
     // 1: a hand; 0: explained; 2: nothing is asked.
     let says: Vec<u8> = (0..w * h)
         .map(|i| {
-            let Some(x) = crate::mask::place(view, &rot, trans, i) else { return 2 };
+            // Beyond the mask as well: an arm reaches farther than the object does.
+            let Some(x) = crate::mask::place(&all, &rot, trans, i) else { return 2 };
             let explains = |(rot, trans): &(Mat3, Vec3)| {
                 let (through, on) = counted(witnesses, *rot * x + *trans, 0.0);
-                through < THROUGH.min(VIEWS) || through <= on
+                through < THROUGH || through <= on
             };
             u8::from(!back.iter().any(explains))
         })

@@ -1,6 +1,6 @@
 //! From the object's cells to its pixels.
 
-use super::pieces::Object;
+use super::pieces::{Object, flies};
 use super::place;
 use super::planes::Plane;
 use glam::Vec3;
@@ -19,7 +19,7 @@ const CUT: f64 = 0.5;
 
 /// The masks of a state's views: 1 = object.
 pub(super) fn masks(views: &[DepthView], object: &Object, supports: &[Plane]) -> Vec<Vec<u8>> {
-    views.par_iter().map(|view| mask(view, supports, &|x| object.has(x))).collect()
+    views.par_iter().map(|view| mask(view, supports, &|x, _| object.has(x))).collect()
 }
 
 /// The masks of pictures of a film, of which `scan` shows the object with nobody near: the scan's
@@ -29,22 +29,23 @@ pub(super) fn of_film(views: &[DepthView], object: &Object, supports: &[Plane], 
     let (lo, hi) = object.bounds();
     let (reach, voxel) = (Vec3::splat(REACH * (hi - lo).length()), object.lattice.voxel);
     let within = |x: Vec3, around: Vec3| x.cmpge(lo - around).all() && x.cmple(hi + around).all();
-    let own = |x: Vec3| {
+    let own = |view: &DepthView, x: Vec3, i: usize| {
         let (through, on) = counted(scan, x, 0.0);
         let (moved, unseen) = (through >= 2 && through > on, through + on == 0);
-        object.has(x) || moved && within(x, reach) || unseen && within(x, Vec3::splat(voxel))
+        let near = moved && within(x, reach) || unseen && within(x, Vec3::splat(voxel));
+        object.has(x) || near && !flies(view, i, view.camera.width)
     };
-    views.par_iter().map(|view| mask(view, supports, &own)).collect()
+    views.par_iter().map(|view| mask(view, supports, &|x, i| own(view, x, i))).collect()
 }
 
-/// `has`: whether a place, world frame, is the object's.
-fn mask(view: &DepthView, supports: &[Plane], has: &(dyn Fn(Vec3) -> bool + Sync)) -> Vec<u8> {
+/// `has`: whether a place, world frame, that a pixel shows is the object's.
+fn mask(view: &DepthView, supports: &[Plane], has: &(dyn Fn(Vec3, usize) -> bool + Sync)) -> Vec<u8> {
     let world_from_camera = view.camera.camera_from_world.inverse();
     let (rot, trans) = (world_from_camera.mat3().as_mat3(), world_from_camera.trans.as_vec3());
     let (w, h) = (view.camera.width, view.camera.height);
     let is_object = |i: usize| {
         let x = place(view, &rot, trans, i)?;
-        Some(!supports.iter().any(|p| p.holds(x, view.depth[i])) && has(x))
+        Some(!supports.iter().any(|p| p.holds(x, view.depth[i])) && has(x, i))
     };
     let known: Vec<Option<bool>> = (0..w * h).map(is_object).collect();
     // Where depth is missing, the neighbours decide.
