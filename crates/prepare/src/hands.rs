@@ -8,8 +8,8 @@
 use crate::error::PrepareError;
 use glam::{Mat3, Vec3};
 use hingecast_articulate::observe::witness::{Witness, counted};
-use hingecast_articulate::{Articulation, DepthView, Depths, OBJECT, OTHER};
-use hingecast_geom::{Pose, Progress};
+use hingecast_articulate::{DepthView, Depths, Labelled, OBJECT, OTHER};
+use hingecast_geom::{KinematicTree, Pose, Progress};
 use rayon::prelude::*;
 
 /// Pixels across a view of the scan when it is asked.
@@ -37,11 +37,22 @@ pub struct Hands {
     pub phantoms: usize,
 }
 
+/// What is believed of a film's parts before its hands are known.
+#[derive(Clone, Copy, Debug)]
+pub struct Belief<'a> {
+    /// Parts and joints, with values of every state.
+    pub tree: &'a KinematicTree,
+    /// camera_from_world as corrected. `[state][view]`
+    pub cameras: &'a [Vec<Pose>],
+    /// Labelled surface.
+    pub samples: &'a [Labelled],
+}
+
 /// Pixels with depth in states 1.. that no part of `found` explains; state 0 is the scan.
 ///
 /// # Errors
 /// A view that cannot be read, the wish to stop.
-pub fn hands(depths: &mut dyn Depths, found: &Articulation, progress: &Progress) -> Result<Hands, PrepareError> {
+pub fn hands(depths: &mut dyn Depths, found: &Belief, progress: &Progress) -> Result<Hands, PrepareError> {
     let n = depths.n_states();
     let placed = |mut views: Vec<DepthView>, state: usize| {
         let cameras = found.cameras.get(state).into_iter().flatten();
@@ -71,7 +82,7 @@ pub fn hands(depths: &mut dyn Depths, found: &Articulation, progress: &Progress)
 }
 
 /// The base and the parts that the scan has surface of.
-fn believed(found: &Articulation) -> Vec<usize> {
+fn believed(found: &Belief) -> Vec<usize> {
     let scan = || found.samples.iter().filter(|s| s.state == 0);
     let least = SEEN * scan().count() as f64;
     let seen = |p: &usize| scan().filter(|s| usize::from(s.part) == *p).count() as f64 >= least;

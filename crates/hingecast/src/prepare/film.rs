@@ -10,15 +10,15 @@ use hingecast_capture::recording::images;
 use hingecast_capture::{Frame, Recording, Split};
 use hingecast_geom::{Pose, Progress};
 use hingecast_prepare::film::{Cut, Placing, cut, onto};
-use hingecast_prepare::hands::hands;
+use hingecast_prepare::hands::{Belief, hands};
 use hingecast_prepare::{PrepareError, Registration};
 use serde::{Deserialize, Serialize};
 use std::path::Path;
 
 /// States that a film is cut into, the scan among them, unless a person says otherwise.
-pub const FILM_STATES: usize = 40;
+pub const FILM_STATES: usize = 30;
 /// Cells along the object's longest side, in which hands are told from parts.
-const CELLS: usize = 72;
+const CELLS: usize = 64;
 /// More of the object's pixels than this are no hand: the parts are wrong.
 const TOO_MANY: f64 = 0.6;
 
@@ -132,7 +132,8 @@ pub(super) fn find_hands(
     let config = Config { cells: CELLS, borders: false, resample: false, seed, ..Config::default() };
     let mut depths = RawDepths::all_masked(recording);
     let found = find(&mut depths, &config, progress)?;
-    let found = hands(&mut depths, &found, progress).map_err(|e| failure(e, recording))?;
+    let belief = Belief { tree: &found.tree, cameras: &found.cameras, samples: &found.samples };
+    let found = hands(&mut depths, &belief, progress).map_err(|e| failure(e, recording))?;
     let used = found.share <= TOO_MANY;
     let report = HandReport { share: found.share, phantoms: found.phantoms, used };
     for (state, masks) in found.masks.iter().enumerate().skip(1).filter(|_| used) {

@@ -73,11 +73,11 @@ fn compare(b: &DepthView, p: DVec3, step: usize) -> Option<f64> {
     }
     let (x, y) = (uv.x as usize, uv.y as usize);
     // At an edge only what lies before all of it tells something.
-    let (z, one_surface) = match even(b, x, y, step) {
+    let (z, one_surface) = match between(b, uv, step) {
         Some(z) => (z, true),
-        None => (around(b, x, y, step)?.0, false),
+        None => (f64::from(around(b, x, y, step)?.0), false),
     };
-    let off = f64::from(z) / p.z - 1.0;
+    let off = z / p.z - 1.0;
     // Well before it: hidden.
     (off > OTHER || one_surface && off.abs() < OTHER).then_some(off)
 }
@@ -87,6 +87,17 @@ fn even(view: &DepthView, x: usize, y: usize, step: usize) -> Option<f32> {
     let (lo, hi) = around(view, x, y, step)?;
     let z = view.depth[y * view.camera.width + x];
     (hi - lo < STEP * z).then_some(z)
+}
+
+/// Depth at a place between pixels, on the plane through those around: its inverse is affine.
+fn between(view: &DepthView, uv: DVec2, step: usize) -> Option<f64> {
+    let (x, y, w) = (uv.x as usize, uv.y as usize, view.camera.width);
+    even(view, x, y, step)?;
+    let inverse = |x: usize, y: usize| 1.0 / f64::from(view.depth[y * w + x]);
+    let slope = |ahead: f64, behind: f64| 0.5 * (ahead - behind) / step as f64;
+    let along = slope(inverse(x + step, y), inverse(x - step, y)) * (uv.x - x as f64 - 0.5);
+    let down = slope(inverse(x, y + step), inverse(x, y - step)) * (uv.y - y as f64 - 0.5);
+    Some(1.0 / (inverse(x, y) + along + down))
 }
 
 /// Nearest and farthest depth around a pixel; `None` where one is not known.
