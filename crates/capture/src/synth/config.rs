@@ -105,6 +105,9 @@ pub struct SynthReport {
     pub notes: Vec<String>,
 }
 
+/// A film with fewer pictures holds no play.
+const FEWEST_PICTURES: usize = 10;
+
 impl SynthConfig {
     /// The same with what a film decides: the scan is a state, every picture of the play another.
     pub(super) fn resolved(&self) -> Self {
@@ -130,7 +133,7 @@ pub(super) fn validate(c: &SynthConfig) -> Result<(), CaptureError> {
         (drift_is_sane(c), "drift", format!("{:?}", c.world.drift), "0 to 45 degrees, 0 mm or more"),
         (push_is_sane(c), "push", format!("{:?}", c.world.push), "finite mm and degrees, in states from 1 to the last"),
         (
-            c.film.is_none_or(|n| n >= super::film::FEWEST && c.occluders == 0.0 && c.world.push.is_none()),
+            c.film.is_none_or(|n| n >= FEWEST_PICTURES && c.occluders == 0.0 && c.world.push.is_none()),
             "film",
             format!("{:?}", c.film),
             "10 pictures or more, without occluders and push: hands are in the film anyway",

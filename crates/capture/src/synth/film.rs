@@ -15,8 +15,6 @@ pub(super) const PLAY: &str = "play";
 /// Pictures a second of the play; those of the scan are taken as a person walks.
 pub(super) const SECS_PER_PICTURE: f64 = 0.1;
 pub(super) const SECS_PER_VIEW: f64 = 0.5;
-/// Fewer pictures hold no play.
-pub(super) const FEWEST: usize = 10;
 /// Share of a joint's time in which nothing moves: before it, half-way, and after it.
 const RESTS: [f64; 3] = [0.12, 0.12, 0.06];
 /// How far the first stroke of a joint goes, share of its range: at least, and how much more at most.

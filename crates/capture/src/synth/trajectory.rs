@@ -18,7 +18,7 @@ const FRONT: f64 = 70.0;
 const FRONT_HIGHEST: f64 = 0.8;
 
 /// Who looks on while somebody plays walks this far to either side of the front, degrees, at these
-/// elevations, and is less steady the longer it takes: swings a picture.
+/// elevations; how many swings of an unsteady hand a picture takes.
 const LOOK_ON: f64 = 35.0;
 const LOOK_ON_HEIGHTS: [f64; 2] = [18.0, 42.0];
 const SWINGS: f64 = 0.02;

@@ -19,6 +19,10 @@ use std::path::Path;
 pub const FILM_STATES: usize = 30;
 /// Cells along the object's longest side, in which hands are told from parts.
 const CELLS: usize = 64;
+/// Parts that are sought then, hands among them.
+const MOST_PARTS: usize = 8;
+/// Passes that give the last digits, which hands do not need.
+const SKIPPED: [&str; 4] = ["turn_axes", "far_hinges", "align_axes", "split_coupled"];
 /// More of the object's pixels than this are no hand: the parts are wrong.
 const TOO_MANY: f64 = 0.6;
 
@@ -129,7 +133,15 @@ pub(super) fn find_hands(
     seed: u64,
     progress: &Progress,
 ) -> Result<HandReport> {
-    let config = Config { cells: CELLS, borders: false, resample: false, seed, ..Config::default() };
+    let config = Config {
+        cells: CELLS,
+        max_parts: MOST_PARTS,
+        align_cameras: false,
+        borders: false,
+        resample: false,
+        seed,
+        skip: SKIPPED.map(String::from).to_vec(),
+    };
     let mut depths = RawDepths::all_masked(recording);
     let found = find(&mut depths, &config, progress)?;
     let belief = Belief { tree: &found.tree, cameras: &found.cameras, samples: &found.samples };
@@ -146,6 +158,26 @@ pub(super) fn find_hands(
         }
     }
     Ok(report)
+}
+
+/// What of a film was taken for hands, for a person.
+pub(super) fn hands_sentence(found: &HandReport) -> String {
+    let percent = 100.0 * found.share;
+    match found.used {
+        true => format!("hands: {percent:.0} % of the object's pixels in the film belong to no part and are left out"),
+        false => format!("hands: none believed; {percent:.0} % of the object's pixels in the film fit no part"),
+    }
+}
+
+/// What is doubtful about them.
+pub(super) fn hands_doubt(found: &HandReport) -> Option<String> {
+    let percent = 100.0 * found.share;
+    (!found.used).then(|| {
+        format!(
+            "{percent:.0} % of the object's pixels in the film fit no part: too many for hands; the parts may be wrong, and \
+             hands are in the twin"
+        )
+    })
 }
 
 /// Of a frame's hands, in the folder of what was prepared.

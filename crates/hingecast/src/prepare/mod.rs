@@ -215,8 +215,8 @@ fn prepared(
     }
     if recording.film {
         let hands = film::find_hands(recording, at, seed, progress)?;
-        watcher.say(&words::hands(&hands));
-        prepared.doubts.extend(words::hands_doubt(&hands));
+        watcher.say(&film::hands_sentence(&hands));
+        prepared.doubts.extend(film::hands_doubt(&hands));
         prepared.hands = Some(hands);
     } else {
         // A hand that comes and goes looks like a push.

@@ -1,6 +1,5 @@
 //! What a person reads about it.
 
-use super::film::HandReport;
 use crate::failure::Failure;
 use hingecast_capture::Recording;
 use hingecast_prepare::{PrepareError, Registration};
@@ -17,25 +16,6 @@ pub fn sentence(found: &Registration) -> String {
             p.states.0,
             p.states.1,
             100.0 * p.second
-        )
-    })
-}
-
-/// What of a film was taken for hands, for a person.
-pub(super) fn hands(found: &HandReport) -> String {
-    let percent = 100.0 * found.share;
-    match found.used {
-        true => format!("hands: {percent:.0} % of the object's pixels in the film belong to no part and are left out"),
-        false => format!("hands: none believed; {percent:.0} % of the object's pixels in the film fit no part"),
-    }
-}
-
-/// What is doubtful about them.
-pub(super) fn hands_doubt(found: &HandReport) -> Option<String> {
-    let percent = 100.0 * found.share;
-    (!found.used).then(|| {
-        format!(
-            "{percent:.0} % of the object's pixels in the film fit no part: too many for hands; the parts may be wrong, and              hands are in the twin"
         )
     })
 }
