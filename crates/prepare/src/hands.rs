@@ -6,6 +6,7 @@
 //! looked through.
 
 use crate::error::PrepareError;
+use crate::scan::extent;
 use glam::{Mat3, Vec3};
 use hingecast_articulate::observe::witness::{Witness, counted};
 use hingecast_articulate::{DepthView, Depths, Labelled, OBJECT, OTHER};
@@ -16,8 +17,12 @@ use rayon::prelude::*;
 const ACROSS: usize = 320;
 /// Views of the scan that look through a place, at least, where nothing stood.
 const THROUGH: usize = 2;
-/// A part has at least this share of the samples that the scan has; what has fewer is a hand itself.
-const SEEN: f64 = 0.004;
+/// A part has at least this share of the samples that the scan has, and in the scan at least this share
+/// of what it has in a state of the film; what has fewer is a hand itself.
+const SEEN: f64 = 0.002;
+const AS_MANY: f64 = 0.25;
+/// Space around the object in which parts may have been hidden from the scan, shares of its longest side.
+const AROUND_OBJECT: f32 = 0.02;
 /// Pixels around one that decide with it, and the share of them that must say so.
 const AROUND: usize = 2;
 const AGREE: f64 = 0.5;
@@ -61,6 +66,7 @@ pub fn hands(depths: &mut dyn Depths, found: &Belief, progress: &Progress) -> Re
     };
     let scan = placed(depths.views(0)?, 0);
     let witnesses = Witness::some(&scan, ACROSS);
+    let inside = extent(&scan, AROUND_OBJECT).unwrap_or((Vec3::INFINITY, Vec3::NEG_INFINITY));
     let mut masks = vec![scan.iter().map(|v| vec![0; v.class.len()]).collect::<Vec<_>>()];
     let parts = believed(found);
     let (mut own, mut all) = (0u32, 0u32);
@@ -70,7 +76,7 @@ pub fn hands(depths: &mut dyn Depths, found: &Belief, progress: &Progress) -> Re
         let (before, now) = (found.tree.poses_at(0), found.tree.poses_at(state));
         let back: Vec<Pose> = parts.iter().map(|&p| before[p] * now[p].inverse()).collect();
         let views = placed(depths.views(state)?, state);
-        let hidden: Vec<Vec<u8>> = views.par_iter().map(|view| of_view(view, &back, &witnesses)).collect();
+        let hidden: Vec<Vec<u8>> = views.par_iter().map(|view| of_view(view, &back, &witnesses, inside)).collect();
         for (view, hand) in views.iter().zip(&hidden) {
             all += view.class.iter().filter(|c| **c == OBJECT).count() as u32;
             own += view.class.iter().zip(hand).filter(|(c, h)| **c == OBJECT && **h == 1).count() as u32;
@@ -85,12 +91,17 @@ pub fn hands(depths: &mut dyn Depths, found: &Belief, progress: &Progress) -> Re
 fn believed(found: &Belief) -> Vec<usize> {
     let scan = || found.samples.iter().filter(|s| s.state == 0);
     let least = SEEN * scan().count() as f64;
-    let seen = |p: &usize| scan().filter(|s| usize::from(s.part) == *p).count() as f64 >= least;
+    let states = found.cameras.len().max(2) as f64 - 1.0;
+    let seen = |p: &usize| {
+        let own = found.samples.iter().filter(|s| usize::from(s.part) == *p);
+        let (scan, all) = own.fold((0.0, 0.0), |(scan, all), s| (scan + f64::from(u8::from(s.state == 0)), all + 1.0));
+        scan >= least && scan >= AS_MANY * (all - scan) / states
+    };
     (0..found.tree.parts.len()).filter(|p| found.tree.joint_of(*p).is_none() || seen(p)).collect()
 }
 
-/// 1 where a pixel shows a hand. `back`: a pose a part.
-fn of_view(view: &DepthView, back: &[Pose], witnesses: &[Witness]) -> Vec<u8> {
+/// 1 where a pixel shows a hand. `back`: a pose a part; `inside`: the box of the object in the scan.
+fn of_view(view: &DepthView, back: &[Pose], witnesses: &[Witness], inside: (Vec3, Vec3)) -> Vec<u8> {
     let (w, h) = (view.camera.width, view.camera.height);
     let world_from_camera = view.camera.camera_from_world.inverse();
     let (rot, trans) = (world_from_camera.mat3().as_mat3(), world_from_camera.trans.as_vec3());
@@ -103,10 +114,15 @@ fn of_view(view: &DepthView, back: &[Pose], witnesses: &[Witness]) -> Vec<u8> {
             // Beyond the mask as well: an arm reaches farther than the object does.
             let Some(x) = crate::mask::place(&all, &rot, trans, i) else { return 2 };
             let explains = |(rot, trans): &(Mat3, Vec3)| {
-                let (through, on) = counted(witnesses, *rot * x + *trans, 0.0);
-                through < THROUGH || through <= on
+                let x = *rot * x + *trans;
+                let (through, on) = counted(witnesses, x, 0.0);
+                // Out of the object's box nothing of it can have hidden.
+                let hidden = through < THROUGH && x.cmpge(inside.0).all() && x.cmple(inside.1).all();
+                hidden || (on > 0 && on >= through)
             };
-            u8::from(!back.iter().any(explains))
+            // Of the room much was never seen.
+            let room = view.class[i] == OTHER && counted(witnesses, x, 0.0).0 < THROUGH;
+            u8::from(!room && !back.iter().any(explains))
         })
         .collect();
     let near = |k: usize, end: usize, reach: usize| k.saturating_sub(reach)..(k + reach + 1).min(end);

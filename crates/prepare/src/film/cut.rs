@@ -52,7 +52,7 @@ fn rests(n: usize, change: &(dyn Fn(usize, usize) -> Change + Sync)) -> Vec<(usi
         // The farthest of the few first: in a motion it moved most.
         let mut last = first;
         if still(first, first + REST - 1) {
-            while last + 1 < n && still(first, last + 1) && still((first + last + 1) / 2, last + 1) {
+            while last + 1 < n && still(first, last + 1) && still((first + last).div_ceil(2), last + 1) {
                 last += 1;
             }
         }
