@@ -110,9 +110,8 @@ pub fn find(depths: &mut dyn Depths, config: &Config, progress: &Progress) -> Re
     )?;
     let discovery = discover(&evidence, config.max_parts, seed, progress)?;
     let cost = discovery.cost;
-    progress.report(0, 1, "refining")?;
     let (mut estimate, mut trace);
-    (evidence, estimate, trace) = settle(evidence, discovery, seed, &config.skip);
+    (evidence, estimate, trace) = settle(evidence, discovery, seed, &config.skip, progress)?;
     correct(&estimate.world_from_state, &mut cameras);
     let mut labels = label_clouds(&evidence, &estimate.tree, &estimate.owners);
     let noisy = evidence.is_noisy();
@@ -134,7 +133,7 @@ pub fn find(depths: &mut dyn Depths, config: &Config, progress: &Progress) -> Re
         drop(before);
         let again = Discovery::again(&evidence, estimate.tree, cost);
         let second;
-        (evidence, estimate, second) = settle(evidence, again, seed, &config.skip);
+        (evidence, estimate, second) = settle(evidence, again, seed, &config.skip, progress)?;
         trace.extend(second);
         correct(&estimate.world_from_state, &mut cameras);
         labels = label_clouds(&evidence, &estimate.tree, &estimate.owners);

@@ -9,14 +9,15 @@ use hingecast_articulate::observe::witness::Witness;
 use hingecast_articulate::passes::driver::settle;
 use hingecast_articulate::shown::shown;
 use hingecast_articulate::value_by_views::correct;
-use hingecast_geom::KinematicTree;
+use hingecast_geom::{KinematicTree, Progress};
 
 /// A lid in the middle of its way came out as one that leans the other way, and stayed there.
 #[test]
 fn a_value_that_views_contradict_is_sought_again() {
     let scene = cupboard_open_by(&[0.0, 0.5, 1.2, 0.8, 0.9], &[0.0, 0.0, 0.1, 0.3, 0.45]).coarse();
     let evidence = scene.evidence();
-    let (evidence, mut estimate, _) = settle(scene.evidence(), discovery(&evidence, &scene.tree), 0, &[]);
+    let (evidence, mut estimate, _) =
+        settle(scene.evidence(), discovery(&evidence, &scene.tree), 0, &[], &Progress::default()).unwrap();
     let labels = label_clouds(&evidence, &estimate.tree, &estimate.owners);
     let witnesses: Vec<Vec<Witness>> = (0..5).map(|s| Witness::some(&scene.recorded(s), 160)).collect();
     let j = (0..2).find(|j| estimate.tree.joints[*j].screw.kind.turns()).expect("a hinge");
