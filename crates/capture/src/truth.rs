@@ -37,6 +37,10 @@ pub struct Truth {
     /// true world. Empty: the true world in all states.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub recording_from_world: Vec<Pose>,
+    /// Of a film: when each state but the first, which is the scan, was taken, seconds of the play.
+    /// Empty: no film.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub film_times: Vec<f64>,
 }
 
 impl Truth {

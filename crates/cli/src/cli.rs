@@ -7,6 +7,7 @@ use clap::builder::{PossibleValuesParser, TypedValueParser};
 use clap::{Args, Parser, Subcommand};
 use hingecast::config::{Method, Preset};
 use hingecast::import_object::ImportConfig;
+use hingecast::prepare::FILM_STATES;
 use hingecast_capture::import;
 use hingecast_capture::synth::Noise;
 use std::path::PathBuf;
@@ -23,6 +24,13 @@ First steps:
   hingecast eval run --truth rec.truth             how far off is it?
 
 Exit status: 0 done, 1 under a bar that you asked for, 2 error, 130 stopped by Ctrl-C.";
+
+/// A scan and a film are two states, and the search for parts compares so many.
+fn film_states(text: &str) -> Result<usize, String> {
+    let most = hingecast::MOST_STATES;
+    let n = text.parse().ok().filter(|n| (2..=most).contains(n));
+    n.ok_or_else(|| format!("a whole number from 2 to {most} is expected"))
+}
 
 fn at_least_one(text: &str) -> Result<usize, String> {
     text.parse().ok().filter(|n| *n >= 1).ok_or_else(|| "a whole number from 1 is expected".to_string())
@@ -154,6 +162,14 @@ pub struct SynthSettings {
     /// little else are marked.
     #[arg(long, conflicts_with = "occluders")]
     pub play: bool,
+    /// A film: `OUT/scan`, a walk around the object of --views pictures, and `OUT/play`, one video in
+    /// which hands move the joints while the camera moves, as an app leaves them: no masks, no
+    /// states. `hingecast import OUT/scan --film OUT/play` takes them.
+    #[arg(long, conflicts_with_all = ["occluders", "play", "states", "test_views", "masks", "trajectory", "push"])]
+    pub film: bool,
+    /// Pictures of the play of a film, ten a second.
+    #[arg(long, default_value_t = 150, value_name = "N", requires = "film")]
+    pub play_frames: usize,
     /// First and last value of a joint, radians (hinge) or scene units (slide); may be repeated
     /// [default: what it can do].
     #[arg(long = "range", value_name = "JOINT=FROM:TO")]
@@ -167,6 +183,16 @@ pub struct Import {
     /// Folder of the recording to convert, or a .r3d or .zip. Several: one state each, in this order.
     #[arg(required = true, value_name = "SOURCE")]
     pub sources: Vec<PathBuf>,
+    /// A film in which hands move the parts of what the only SOURCE, a scan, shows at rest; one camera,
+    /// any layout. It is cut into states: rests, and single pictures between them.
+    #[arg(long, value_name = "PLAY")]
+    pub film: Option<PathBuf>,
+    /// States that a film is cut into at most, the scan among them.
+    #[arg(long, default_value_t = FILM_STATES, value_name = "N", requires = "film", value_parser = film_states)]
+    pub film_states: usize,
+    /// Pictures of a film that are looked at, evenly spread over it.
+    #[arg(long, default_value_t = import::FILM_PICTURES, value_name = "N", requires = "film", value_parser = at_least_one)]
+    pub film_pictures: usize,
     /// Recording folder to write.
     #[arg(long, short)]
     pub out: PathBuf,

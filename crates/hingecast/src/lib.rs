@@ -56,4 +56,5 @@ pub mod watcher;
 pub use build::{Options, Stage, build};
 pub use config::{Config, Method, Preset};
 pub use failure::{Failure, Result};
+pub use hingecast_articulate::MOST_STATES;
 pub use watcher::{Silent, Watcher};

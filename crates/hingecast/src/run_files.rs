@@ -86,14 +86,14 @@ fn is_stages(stage: &str, path: &Path) -> bool {
     let more = match stage {
         "motion" => numbered("state_", ".ply"),
         "twin" => hingecast_twin::is_ours(path),
-        "prepare" => is_mask(name),
+        "prepare" => is_mask(name.strip_prefix("hand_").unwrap_or(name)),
         "report" => numbered("state_", ".png") || numbered("held_out_", ".png"),
         _ => false,
     };
     more || name == STAMP || known.contains(&name)
 }
 
-/// `s003_v012.png`, as the masks are called that a build finds.
+/// `s003_v012.png`, as the masks are called that a build finds; `hand_` before it: the hands in it.
 fn is_mask(name: &str) -> bool {
     let inner = name.strip_prefix('s').and_then(|n| n.strip_suffix(".png"));
     inner.is_some_and(|n| n.contains("_v") && n.bytes().all(|b| b.is_ascii_digit() || b == b'_' || b == b'v'))

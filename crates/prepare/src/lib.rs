@@ -4,7 +4,9 @@
 //! ```text
 //! settle      the views of each scan among themselves, where tracking drifted
 //! register    the states' frames, brought together on what stands still: pairs of scans globally, all together finely
+//! film        one camera that looks on while hands move the parts, cut into states
 //! mask        the object without masks: what moves, and what that hangs on
+//! hands       what no part explains
 //! ```
 //!
 //! World frame, scene units and radians; `a_from_b` maps points of frame b into frame a; cameras are
@@ -13,6 +15,8 @@
 #![warn(missing_docs)]
 
 mod error;
+pub mod film;
+pub mod hands;
 pub mod mask;
 pub mod register;
 mod scan;

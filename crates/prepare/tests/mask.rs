@@ -11,7 +11,7 @@ use hingecast_prepare::{PrepareError, Wanted, object_masks};
 fn the_cupboard_is_what_moves_and_what_that_hangs_on() {
     let scene = |k: usize| [room(), cupboard(30.0 * k as f64, Pose::IDENTITY)].concat();
     let mut states: Vec<_> = (0..4).map(|k| views(&scene(k), &Pose::IDENTITY, 12, k as u64)).collect();
-    let found = object_masks(&mut states, &Wanted::Moving, DVec3::Z, 0, &Progress::default()).unwrap();
+    let found = object_masks(&mut states, &Wanted::Moving, false, DVec3::Z, 0, &Progress::default()).unwrap();
     assert_eq!(found.report.supports.len(), 2, "floor and wall: {:?}", found.report);
     let first = room().len() as u8 + 1;
     let mut all = Vec::new();
@@ -33,7 +33,7 @@ fn the_cupboard_is_what_moves_and_what_that_hangs_on() {
 fn nothing_that_moves_is_no_object() {
     let scene = [room(), cupboard(20.0, Pose::IDENTITY)].concat();
     let mut states: Vec<_> = (0..3).map(|k| views(&scene, &Pose::IDENTITY, 12, k as u64)).collect();
-    let found = object_masks(&mut states, &Wanted::Moving, DVec3::Z, 0, &Progress::default());
+    let found = object_masks(&mut states, &Wanted::Moving, false, DVec3::Z, 0, &Progress::default());
     assert!(matches!(found, Err(PrepareError::NothingMoved { .. })), "{:?}", found.map(|f| f.report));
 }
 
@@ -44,7 +44,7 @@ fn a_person_says_what_the_object_is() {
     let first = room().len() as u8 + 1;
     let overlap = |wanted: Wanted| {
         let mut states: Vec<_> = (0..2).map(|k| views(&scene, &Pose::IDENTITY, 12, k as u64)).collect();
-        let found = object_masks(&mut states, &wanted, DVec3::Z, 0, &Progress::default()).unwrap();
+        let found = object_masks(&mut states, &wanted, false, DVec3::Z, 0, &Progress::default()).unwrap();
         let (mut both, mut either) = (0, 0);
         for (k, masks) in found.masks.iter().enumerate() {
             for (camera, mask) in cameras(12, k as u64).iter().zip(masks) {
@@ -60,6 +60,6 @@ fn a_person_says_what_the_object_is() {
     let by_place = overlap(Wanted::At([0.1, 0.7, 0.9]));
     assert!(by_box > 0.95 && by_place > 0.95, "{by_box} by a box, {by_place} by a place");
     let mut states: Vec<_> = (0..2).map(|k| views(&scene, &Pose::IDENTITY, 12, k as u64)).collect();
-    let nothing = object_masks(&mut states, &Wanted::At([0.0, -0.6, 1.2]), DVec3::Z, 0, &Progress::default());
+    let nothing = object_masks(&mut states, &Wanted::At([0.0, -0.6, 1.2]), false, DVec3::Z, 0, &Progress::default());
     assert!(matches!(nothing, Err(PrepareError::NothingThere)));
 }

@@ -52,13 +52,19 @@ pub struct Config {
     pub every: usize,
     /// At most so many training pictures a state, evenly spread.
     pub max_views: usize,
+    /// The last of two sources is a film in which hands move the parts that the first, a scan, shows
+    /// at rest; of a film, at most so many pictures. Its states are cut later, by who sees depth.
+    pub film: Option<usize>,
 }
+
+/// Pictures of a film that are kept at most: fifteen seconds at 26 a second.
+pub const FILM_PICTURES: usize = 400;
 
 impl Default for Config {
     /// ARKit's low confidence is depth it made up at edges. 120 views show a thing from all sides;
     /// a film has thousands, which cost time and add no side.
     fn default() -> Self {
-        Self { format: Format::Auto, min_confidence: 1, every: 1, max_views: 120 }
+        Self { format: Format::Auto, min_confidence: 1, every: 1, max_views: 120, film: None }
     }
 }
 
@@ -134,6 +140,8 @@ pub(crate) struct Source {
     pub up: DVec3,
     /// All states share one world.
     pub registered: bool,
+    /// The second state is a film.
+    pub film: bool,
     /// See [`ImportReport::notes`].
     pub notes: Vec<String>,
 }
@@ -148,7 +156,7 @@ impl Source {
 impl From<Vec<Shot>> for Source {
     /// Layouts that say nothing of scale and up.
     fn from(shots: Vec<Shot>) -> Self {
-        Self { shots, metric: false, up: DVec3::Z, registered: true, notes: Vec::new() }
+        Self { shots, metric: false, up: DVec3::Z, registered: true, film: false, notes: Vec::new() }
     }
 }
 
@@ -210,6 +218,11 @@ fn convert<P: AsRef<Path>>(
     found: &mut Vec<(PathBuf, PathBuf)>,
 ) -> Result<ImportReport, CaptureError> {
     let several = sources.len() > 1;
+    if config.film.is_some() && sources.len() != 2 {
+        let what = format!("{} scans with a film, and it takes one", sources.len().saturating_sub(1));
+        let hint = "one scan of the thing at rest and one film: hingecast import SCAN --film PLAY -o RECORDING";
+        return Err(CaptureError::new(what, "--film", hint));
+    }
     let mut formats = Vec::new();
     let mut parts = Vec::new();
     for src in sources.iter().map(P::as_ref) {
@@ -223,12 +236,16 @@ fn convert<P: AsRef<Path>>(
             let hint = "check that the folder is complete, or name another --format";
             return Err(CaptureError::new(what, src.display().to_string(), hint));
         }
-        thin::thin(&mut source, config);
+        match config.film.filter(|_| parts.len() == 1) {
+            Some(most) => thin::thin(&mut source, &Config { max_views: most, every: 1, ..config.clone() }),
+            None => thin::thin(&mut source, config),
+        }
         film::take_out(&mut source.shots, scratch)?;
         formats.push(format);
         parts.push((src.to_path_buf(), source));
     }
     let mut source = join::join(parts)?;
+    source.film = config.film.is_some();
     let name = recording_name(sources, out);
     let (recording, notes) = store::store(&source, &name, out, config.min_confidence, progress)?;
     source.notes.extend(notes);

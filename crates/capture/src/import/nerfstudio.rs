@@ -64,6 +64,7 @@ pub(super) fn read(src: &Path, one_state: bool) -> Result<Source, CaptureError> 
         metric: documents.iter().any(|d| d.metric),
         up: documents.first().map_or(DVec3::Z, |d| d.up),
         registered: documents.iter().all(|d| d.registered),
+        film: false,
         notes: Vec::new(),
     };
     if documents.iter().all(is_nerf_capture) {

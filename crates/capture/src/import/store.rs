@@ -60,6 +60,7 @@ pub(super) fn store(
         metric: source.metric,
         up: source.up,
         registered: source.registered,
+        film: source.film,
     };
     recording.write()?;
     // Folders that this source did not need; those with files refuse to go.

@@ -3,7 +3,7 @@
 //! Keys of ours, all optional but `state`: per frame `state` (integer), `view`, `time` (seconds),
 //! `occluded` (bool), `occluder_mask_path`; for the whole `name`, `metric` (lengths are metres),
 //! `up` (world direction, default z), `registered` (false: each state has a world frame of its own,
-//! default true). Instead of `state` a recording may have one
+//! default true), `film` (state 0 is a scan, the others are cut out of a film, default false). Instead of `state` a recording may have one
 //! `state_000/transforms.json` per state. Held-out frames are those that nerfstudio's
 //! `test_filenames` lists.
 
@@ -84,6 +84,9 @@ pub struct Recording {
     /// All states share one world frame. False: each state's poses are in a world of their own
     /// (scans that were put together), and nobody has brought them together yet.
     pub registered: bool,
+    /// State 0 is a scan from all sides; the other states are cut out of a film of play: a few views
+    /// each, and hands may be in them. `time` counts in the film.
+    pub film: bool,
 }
 
 /// Largest tolerated entry of |R'R - 1|: json files with 4 digits stay below, a scaled or sheared
@@ -118,6 +121,7 @@ impl Recording {
         let root = documents.first().map(|d| d.root.clone()).unwrap_or_default();
         let (mut frames, mut origins) = (Vec::new(), Vec::new());
         let (mut name, mut metric, mut up, mut registered) = (None, false, DVec3::Z, true);
+        let film = documents.iter().any(|d| d.film);
         for document in documents {
             problems.extend(document.problems.iter().cloned());
             name = name.or_else(|| document.name.clone());
@@ -148,7 +152,7 @@ impl Recording {
         let n_states = count_states(&frames, documents, problems);
         let folder = || root.file_name().map(|n| n.to_string_lossy().into_owned()).unwrap_or("recording".into());
         let name = name.unwrap_or_else(folder);
-        Self { root, name, frames, n_states, metric, up, registered }
+        Self { root, name, frames, n_states, metric, up, registered, film }
     }
 
     /// Indices of the usable frames of a state, in file order; wholly occluded frames are left out.

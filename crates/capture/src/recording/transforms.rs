@@ -55,6 +55,7 @@ pub(crate) struct Document {
     pub metric: bool,
     pub up: DVec3,
     pub registered: bool,
+    pub film: bool,
     pub problems: Vec<Problem>,
 }
 
@@ -136,10 +137,12 @@ pub(crate) fn parse(root: &Path, file: &Path, folder_state: DefaultState) -> Res
         metric: false,
         up: DVec3::Z,
         registered: true,
+        film: false,
         problems: Vec::new(),
     };
     keep(top.text("name").map(|t| document.name = t.map(String::from)));
     keep(top.flag("metric").map(|m| document.metric = m.unwrap_or(false)));
+    keep(top.flag("film").map(|f| document.film = f.unwrap_or(false)));
     keep(top.flag("registered").map(|r| document.registered = r.unwrap_or(true)));
     keep(top.numbers("up").and_then(|up| match up.map(DVec3::from_array).map(|u| (u, u.try_normalize())) {
         None => Ok(()),

@@ -25,6 +25,9 @@ impl Recording {
         if !self.registered {
             top.insert("registered".into(), json!(false));
         }
+        if self.film {
+            top.insert("film".into(), json!(true));
+        }
         let names =
             |split| self.frames.iter().filter(|f| f.split == split).map(|f| relative(&self.root, &f.color)).collect();
         let (train, test): (Vec<String>, Vec<String>) = (names(Split::Train), names(Split::Test));

@@ -1,6 +1,6 @@
 //! What to record, and what came of it.
 
-use super::world::World;
+use super::world::{Masks, Trajectory, World};
 use crate::CaptureError;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
@@ -38,6 +38,11 @@ pub struct SynthConfig {
     /// A recording of play: in every training frame hands hold the parts that move, and move along;
     /// `time` runs. Instead of `occluders`.
     pub play: bool,
+    /// A film: two captures, `scan` (the joints where they start, `views` pictures on a walk) and
+    /// `play` (so many pictures of one camera that looks on while hands move the joints), as an app
+    /// leaves them. `states`, test views, `play`, masks and the trajectory are then given.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub film: Option<usize>,
     /// What stands around the object, and what happens to it and to the recording.
     #[serde(skip_serializing_if = "World::is_default")]
     pub world: World,
@@ -62,6 +67,7 @@ impl Default for SynthConfig {
             noise: Noise::None,
             occluders: 0.0,
             play: false,
+            film: None,
             world: World::default(),
             truth: true,
             seed: 0,
@@ -99,6 +105,18 @@ pub struct SynthReport {
     pub notes: Vec<String>,
 }
 
+/// A film with fewer pictures holds no play.
+const FEWEST_PICTURES: usize = 10;
+
+impl SynthConfig {
+    /// The same with what a film decides: the scan is a state, every picture of the play another.
+    pub(super) fn resolved(&self) -> Self {
+        let Some(pictures) = self.film else { return self.clone() };
+        let world = World { masks: Masks::None, trajectory: Trajectory::Walk, ..self.world.clone() };
+        Self { states: 1 + pictures, test_views: 0, test_states: 0, play: true, world, ..self.clone() }
+    }
+}
+
 pub(super) fn validate(c: &SynthConfig) -> Result<(), CaptureError> {
     let checks = [
         (c.states >= 1, "states", c.states.to_string(), "1 or more; 2 and more show motion"),
@@ -114,6 +132,12 @@ pub(super) fn validate(c: &SynthConfig) -> Result<(), CaptureError> {
         ),
         (drift_is_sane(c), "drift", format!("{:?}", c.world.drift), "0 to 45 degrees, 0 mm or more"),
         (push_is_sane(c), "push", format!("{:?}", c.world.push), "finite mm and degrees, in states from 1 to the last"),
+        (
+            c.film.is_none_or(|n| n >= FEWEST_PICTURES && c.occluders == 0.0 && c.world.push.is_none()),
+            "film",
+            format!("{:?}", c.film),
+            "10 pictures or more, without occluders and push: hands are in the film anyway",
+        ),
         (!(c.play && c.occluders > 0.0), "occluders", c.occluders.to_string(), "0 with play: hands are in all frames"),
     ];
     match checks.into_iter().find(|(good, ..)| !good) {

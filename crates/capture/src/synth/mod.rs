@@ -8,6 +8,7 @@ mod cameras;
 mod config;
 mod coupled;
 mod drift;
+mod film;
 mod framing;
 mod noise;
 mod occluder;
@@ -60,21 +61,23 @@ pub fn synth(
     progress: &Progress,
 ) -> Result<SynthReport, CaptureError> {
     config::validate(config)?;
+    let config = &config.resolved();
     let out = std::path::absolute(out).map_err(|e| CaptureError::write(out, e))?;
     let truth_out = Truth::folder_of(&out);
     let work = Staging::new(&out)?;
     let truth_work = config.truth.then(|| Staging::new(&truth_out)).transpose()?;
+    let film = config.film.is_some();
     let hands = config.play || config.occluders > 0.0;
-    for (folder, wanted) in
-        [("rgb", true), ("depth", true), ("mask", config.world.masks != Masks::None), ("occluder", hands)]
+    let folders =
+        [("rgb", true), ("depth", true), ("mask", config.world.masks != Masks::None), ("occluder", hands && !film)];
+    for (capture, (folder, _)) in
+        captures(film).iter().flat_map(|c| folders.iter().filter(|f| f.1).map(move |f| (c, f)))
     {
-        if wanted {
-            work.folder(folder)?;
-        }
+        work.folder(&format!("{capture}{folder}"))?;
     }
     if let Some(truth) = &truth_work {
-        truth.folder("labels")?;
-        truth.folder("parts")?;
+        let own = ["labels", "parts"].into_iter().chain(film.then_some(output::HANDS));
+        own.into_iter().try_for_each(|folder| truth.folder(folder))?;
     }
 
     let ranges = plan::ranges(object, config)?;
@@ -94,7 +97,11 @@ pub fn synth(
         object,
         config,
         states: &states,
-        held: if config.play { player::hold(object, &states[..config.states], metres_per_unit) } else { Vec::new() },
+        held: if config.play {
+            player::hold(object, &states[..config.states], film, metres_per_unit)
+        } else {
+            Vec::new()
+        },
         background: Vec3::from_array(
             config.background.map(|c| crate::object::texture::linear_from_srgb(f32::from(c) / 255.0)),
         ),
@@ -116,16 +123,25 @@ pub fn synth(
         })
         .collect::<Result<_, _>>()?;
 
-    let recording = Recording {
-        root: work.path.clone(),
+    let frames: Vec<Frame> = frames.into_iter().flatten().collect();
+    let recording = |root: &str, frames: Vec<Frame>| Recording {
+        root: work.path.join(root),
         name: object.name.clone(),
-        frames: frames.into_iter().flatten().collect(),
-        n_states: config.states,
+        frames,
+        n_states: if film { 1 } else { config.states },
         metric: object.metric,
         up: DVec3::Z,
-        registered: config.world.frames == Frames::Shared,
+        film: false,
+        registered: film || config.world.frames == Frames::Shared,
     };
-    recording.write()?;
+    if film {
+        let (scan, play): (Vec<Frame>, Vec<Frame>) = frames.into_iter().partition(|f| f.state == 0);
+        let play = play.into_iter().enumerate().map(|(view, f)| Frame { state: 0, view, ..f }).collect();
+        recording(film::SCAN, scan).write()?;
+        recording(film::PLAY, play).write()?;
+    } else {
+        recording("", frames).write()?;
+    }
     if let Some(truth) = truth_work {
         output::write_truth(object, config, &ranges, &states, &shots, &placement, &truth.path)?;
         truth.finish()?;
@@ -139,6 +155,11 @@ pub fn synth(
         notes: still::notes(object, &states[..config.states], &shots),
         ranges: names.zip(ranges.iter().map(|r| [r.lower, r.upper])).collect(),
     })
+}
+
+/// What stands before the folders of pictures: of each capture, its own.
+fn captures(film: bool) -> &'static [&'static str] {
+    if film { &["scan/", "play/"] } else { &[""] }
 }
 
 /// What stays the same over all shots.
@@ -181,10 +202,16 @@ impl Studio<'_> {
         let looks = shade::Looks::new(self.object, self.room, hands.iter().map(|h| h.0));
         let with_hands = (!hands.is_empty()).then(|| scene::Scene::new(bodies().chain(hands.iter().copied())));
         poses.extend(self.room.map(|_| Pose::IDENTITY));
+        // All pictures of a play are one way of the camera.
+        let (capture, views) = match self.config.film {
+            Some(pictures) if state > 0 => (1, pictures),
+            _ => (state, self.config.views),
+        };
         let drifted = self.config.world.drift.map_or(Vec::new(), |size| {
-            let seed = self.config.seed ^ 0x6472_6966_7400 ^ ((state as u64) << 48);
+            let seed = self.config.seed ^ 0x6472_6966_7400 ^ ((capture as u64) << 48);
             let mut rng = fastrand::Rng::with_seed(seed.wrapping_mul(0x9e37_79b9_7f4a_7c15));
-            drift::along(self.config.views, &size, 1e-3 / self.metres_per_unit, &mut rng)
+            let all = drift::along(views, &size, 1e-3 / self.metres_per_unit, &mut rng);
+            if self.config.film.is_some() && state > 0 { all[state - 1..state].to_vec() } else { all }
         });
         poses.extend(hands.iter().map(|h| h.1));
         shots
@@ -217,8 +244,15 @@ impl Studio<'_> {
                     exposure.mask = mask;
                 }
                 let camera = self.placement.stated(camera, state);
-                let mut frame = output::write(shot, camera, &exposure, self.depth_scale, self.root, self.truth)?;
-                frame.time = (self.config.play && train).then_some(state as f64 * player::SECS_PER_STATE);
+                let root = match self.config.film {
+                    None => self.root.to_path_buf(),
+                    Some(_) => self.root.join(if state == 0 { film::SCAN } else { film::PLAY }),
+                };
+                let mut frame = output::write(shot, camera, &exposure, self.depth_scale, &root, self.truth)?;
+                frame.time = match self.config.film {
+                    Some(_) => Some(film::time(state, shot.view)),
+                    None => (self.config.play && train).then_some(state as f64 * player::SECS_PER_STATE),
+                };
                 tell()?;
                 Ok(frame)
             })

@@ -67,8 +67,11 @@ impl Exposure {
     }
 }
 
+/// Folder of a truth that holds the pixels of hands, where the recording itself does not.
+pub(super) const HANDS: &str = "hands";
+
 /// Writes the images of a shot; `camera` is the one that the recording will state. Without a folder
-/// for masks, there are none.
+/// for masks or hands, there are none.
 pub(super) fn write(
     shot: &Shot,
     camera: Camera,
@@ -88,11 +91,15 @@ pub(super) fn write(
     if let Some(mask) = &mask {
         images::write_gray(mask, &e.mask, w, h)?;
     }
-    if let Some(hand) = &e.occluder {
+    let occluder = e.occluder.as_ref().filter(|_| root.join("occluder").is_dir());
+    if let Some(hand) = occluder {
         images::write_gray(&file("occluder"), hand, w, h)?;
     }
     if let Some(truth) = truth {
         images::write_gray(&truth.join("labels").join(&name), &e.labels, w, h)?;
+        if let Some(hand) = e.occluder.as_ref().filter(|_| truth.join(HANDS).is_dir()) {
+            images::write_gray(&truth.join(HANDS).join(&name), hand, w, h)?;
+        }
     }
     Ok(Frame {
         state: shot.state,
@@ -104,7 +111,7 @@ pub(super) fn write(
         depth_scale,
         mask,
         occluded: e.occluded,
-        occluder_mask: e.occluder.as_ref().map(|_| file("occluder")),
+        occluder_mask: occluder.map(|_| file("occluder")),
         time: None,
     })
 }
@@ -137,6 +144,7 @@ pub(super) fn write_truth(
         cameras: shots.iter().map(|s| s.camera).collect(),
         world_from_object: placement.world_from_object.clone(),
         recording_from_world: placement.recording_from_world.clone(),
+        film_times: config.film.map_or(Vec::new(), |n| (1..=n).map(|state| super::film::time(state, 0)).collect()),
     };
     truth.write()
 }

@@ -4,7 +4,7 @@ use super::coupled::{self, useful_ranges};
 use super::framing::{Optics, Subject};
 use super::ranges::UsefulRange;
 use super::world::{Placement, Site, Trajectory};
-use super::{SynthConfig, play, trajectory};
+use super::{SynthConfig, film, play, trajectory};
 use crate::object::ArticulatedObject;
 use crate::{CaptureError, Split};
 use glam::{DVec3, Vec3};
@@ -59,6 +59,9 @@ pub(super) fn times(config: &SynthConfig) -> Vec<f64> {
 
 /// Joint values of the recorded states, then of the held-out ones between them.
 pub(super) fn joint_values(object: &ArticulatedObject, config: &SynthConfig, ranges: &[UsefulRange]) -> Vec<Vec<f64>> {
+    if let Some(pictures) = config.film {
+        return film::joint_values(object, ranges, pictures, config.seed);
+    }
     let mut rng = fastrand::Rng::with_seed(config.seed ^ 0x706c_6179);
     let behind: Vec<bool> = ranges.iter().map(|r| r.behind).collect();
     let play = play::Play::new(&behind, config.states == 2, &mut rng);
@@ -93,12 +96,16 @@ pub(super) fn shots(
         trajectory::stands(way, n, front, site, &mut rng)
     };
     let rig = config.same_cameras && way != Trajectory::Walk;
+    let mut looking_on = config.film.map(|pictures| film::stands(pictures, front, site, config.seed).into_iter());
     let per_state = |state: usize| {
+        if let Some(play) = looking_on.as_mut().filter(|_| state > 0) {
+            return (play.next().into_iter().collect(), Vec::new());
+        }
         let salt = if rig { 0 } else { state as u64 };
         let train = if state < config.states { stands(salt, config.views) } else { Vec::new() };
         (train, stands(1_000_003 + state as u64, config.test_views))
     };
-    let all: Vec<_> = (0..states.len()).map(per_state).collect();
+    let all: Vec<(Vec<trajectory::Stand>, Vec<trajectory::Stand>)> = (0..states.len()).map(per_state).collect();
     let distance = subject.distance(all.iter().flat_map(|(train, test)| train.iter().chain(test)), &optics);
     let mut shots = Vec::new();
     for (state, (train, test)) in all.iter().enumerate() {

@@ -31,11 +31,12 @@ pub(super) struct Hand {
     pub states: Vec<usize>,
 }
 
-/// A hand for every joint that moves in `states`.
-pub(super) fn hold(object: &ArticulatedObject, states: &[Vec<f64>], metres_per_unit: f64) -> Vec<Hand> {
+/// A hand for every joint that moves in `states`. `film`: a hand holds on through short rests.
+pub(super) fn hold(object: &ArticulatedObject, states: &[Vec<f64>], film: bool, metres_per_unit: f64) -> Vec<Hand> {
     let joints = object.tree.joints.iter().enumerate();
     let one = |(j, joint): (usize, &Joint)| {
-        let held = moving_states(j, states);
+        let moving = moving_states(j, states);
+        let held = if film { super::film::held(moving) } else { moving };
         // Between two joints of one body there is nothing to hold.
         let solid = !object.parts[joint.child].faces.is_empty();
         (!held.is_empty() && solid).then(|| {

@@ -44,24 +44,19 @@ impl Staging {
 /// It holds something else. `transforms.json` alone is no proof: captures of people have one as
 /// well, beside pictures that nobody can take again.
 pub fn may_be_replaced(target: &Path) -> Result<(), CaptureError> {
-    may_become("output folder", target, &["transforms.json", "truth.json"], HINT)?;
+    may_become("output folder", target, &["transforms.json", "truth.json", "play/transforms.json"], HINT)?;
     may_be_emptied(
         "output folder",
         target,
-        &|path| is_ours(path) && (target.join(path) != transforms(target) || wrote(target)),
+        &|path| is_ours(path) && (!path.ends_with("transforms.json") || wrote(&target.join(path))),
         HINT,
     )?;
     Ok(())
 }
 
-fn transforms(target: &Path) -> PathBuf {
-    target.join("transforms.json")
-}
-
-/// Whether we wrote the recording's `transforms.json`: others' do not say what is up and whether it
-/// is metric.
-fn wrote(target: &Path) -> bool {
-    let text = std::fs::read(transforms(target)).unwrap_or_default();
+/// Whether we wrote a `transforms.json`: others' do not say what is up and whether it is metric.
+fn wrote(transforms: &Path) -> bool {
+    let text = std::fs::read(transforms).unwrap_or_default();
     let json: serde_json::Value = serde_json::from_slice(&text).unwrap_or_default();
     ["up", "metric", "frames"].iter().all(|key| json.get(key).is_some())
 }
@@ -72,7 +67,10 @@ fn is_ours(path: &Path) -> bool {
     let names: Option<Vec<&str>> = path.iter().map(|name| name.to_str()).collect();
     match names.as_deref() {
         Some(["transforms.json" | "truth.json"]) => true,
-        Some(["rgb" | "depth" | "mask" | "occluder" | "labels", name]) => is_view(name),
+        Some(["rgb" | "depth" | "mask" | "occluder" | "labels" | "hands", name]) => is_view(name),
+        // The two captures of a film.
+        Some(["scan" | "play", "transforms.json"]) => true,
+        Some(["scan" | "play", "rgb" | "depth", name]) => is_view(name),
         Some(["parts", name]) => name.ends_with(".ply"),
         _ => false,
     }

@@ -17,6 +17,12 @@ const WOBBLE: [f64; 3] = [1.2, 1.2, 3.0];
 const FRONT: f64 = 70.0;
 const FRONT_HIGHEST: f64 = 0.8;
 
+/// Who looks on while somebody plays walks this far to either side of the front, degrees, at these
+/// elevations; how many swings of an unsteady hand a picture takes.
+const LOOK_ON: f64 = 35.0;
+const LOOK_ON_HEIGHTS: [f64; 2] = [18.0, 42.0];
+const SWINGS: f64 = 0.02;
+
 /// Where a camera stands and how it is held.
 pub(super) struct Stand {
     /// Unit vector from the centre of the object.
@@ -78,6 +84,26 @@ fn walk(n: usize, front: DVec3, reach_deg: f64, rng: &mut fastrand::Rng) -> Vec<
         Stand {
             direction: towards(front, leftwards * reach_deg.to_radians() * (2.0 * t - 1.0), elevation.sin()),
             farther: between(WALK_DISTANCE, distance.at(2.0 * t)),
+            held: held * 1f64.to_radians(),
+        }
+    };
+    (0..n).map(stand).collect()
+}
+
+/// From one side of the front slowly to the other, as somebody goes who films a play of `n` pictures.
+pub(super) fn look_on(n: usize, front: DVec3, site: Option<&Site>, rng: &mut fastrand::Rng) -> Vec<Stand> {
+    let leftwards = if rng.bool() { 1.0 } else { -1.0 };
+    let [height, distance, pitch, yaw, roll] = [(); 5].map(|()| Sway::new(rng));
+    let between = |[lo, hi]: [f64; 2], x: f64| lo + (hi - lo) * 0.5 * (1.0 + x);
+    let stand = |i: usize| {
+        let (t, swings) = ((i as f64 + 0.5) / n as f64, SWINGS * i as f64);
+        let elevation = between(LOOK_ON_HEIGHTS, height.at(t)).to_radians();
+        let held = DVec3::new(WOBBLE[0] * pitch.at(swings), WOBBLE[1] * yaw.at(swings), WOBBLE[2] * roll.at(swings));
+        let azimuth = leftwards * LOOK_ON.to_radians() * (2.0 * t - 1.0);
+        let direction = towards(front, azimuth, elevation.sin());
+        Stand {
+            direction: site.map_or(direction, |site| site.in_front(direction)),
+            farther: between(WALK_DISTANCE, distance.at(t)),
             held: held * 1f64.to_radians(),
         }
     };

@@ -28,9 +28,10 @@ pub struct WorldSettings {
     #[arg(long, default_value = "true", value_parser = words::<Masks>(&["true", "none", "sam"]))]
     pub masks: Masks,
     /// Frames of reference: `per-state` turns each state's cameras but the first's about `up` by 0
-    /// to 360 deg and shifts them by up to 2 m, as phone scans are; `tilted` turns them in any way.
-    #[arg(long, default_value = "shared", value_parser = words::<Frames>(&["shared", "per-state", "tilted"]))]
-    pub frames: Frames,
+    /// to 360 deg and shifts them by up to 2 m, as phone scans are; `tilted` turns them in any way
+    /// [default: shared; with --film, of which the scan is a state and the play one, per-state].
+    #[arg(long, value_parser = words::<Frames>(&["shared", "per-state", "tilted"]))]
+    pub frames: Option<Frames>,
     /// The object is pushed by MM millimetres and turned by DEG degrees, 2 unless given, between
     /// two states, and stays there [default: not pushed].
     #[arg(long, value_name = "MM[:DEG]")]
@@ -41,12 +42,13 @@ pub struct WorldSettings {
 }
 
 impl WorldSettings {
-    pub fn world(&self) -> World {
+    /// `film`: whether a film is recorded.
+    pub fn world(&self, film: bool) -> World {
         let push = self.push.clone().map(|push| Push { states: self.push_states.clone(), ..push });
         World {
             scene: self.scene,
             masks: self.masks,
-            frames: self.frames,
+            frames: self.frames.unwrap_or(if film { Frames::PerState } else { Frames::Shared }),
             push,
             lens: self.camera,
             trajectory: self.trajectory,

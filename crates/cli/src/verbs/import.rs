@@ -8,13 +8,16 @@ use hingecast_capture::Recording;
 use hingecast_capture::import::{Config, Format, import};
 
 pub fn run(session: &Session, args: &Import) -> Result<Outcome> {
+    let mut sources = args.sources.clone();
+    sources.extend(args.film.clone());
     let config = Config {
         format: Format::from_name(&args.format)?,
         min_confidence: args.min_confidence,
         every: args.every,
         max_views: args.max_views,
+        film: args.film.as_ref().map(|_| args.film_pictures),
     };
-    let report = import(&args.sources, &args.out, &config, &session.ui.stage("import"))?;
+    let report = import(&sources, &args.out, &config, &session.ui.stage("import"))?;
     report.notes.iter().for_each(|note| session.ui.say(&format!("note: {note}")));
     session.ui.say(&format!(
         "imported {} frames in {} states -> {}",
@@ -23,8 +26,13 @@ pub fn run(session: &Session, args: &Import) -> Result<Outcome> {
         report.recording.display()
     ));
     let mut recording = Recording::open(&report.recording)?;
-    let mut registration = None;
-    if !recording.registered && recording.n_states > 1 {
+    let (mut registration, mut states) = (None, report.states);
+    if recording.film {
+        let film = prepare::film(&mut recording, args.film_states, 0, &session.ui.stage("film"))?;
+        session.ui.say(&prepare::sentence(&film.registration));
+        prepare::film_sentences(&film).iter().for_each(|line| session.ui.say(line));
+        (registration, states) = (Some(film.registration), recording.n_states);
+    } else if !recording.registered && recording.n_states > 1 {
         let found = prepare::register(&mut recording, 0, &session.ui.stage("register"))?;
         recording.write()?;
         session.ui.say(&prepare::sentence(&found));
@@ -37,8 +45,8 @@ pub fn run(session: &Session, args: &Import) -> Result<Outcome> {
     session.answer(&serde_json::json!({
         "recording": report.recording,
         "formats": report.formats,
-        "states": report.states,
-        "frames": report.frames,
+        "states": states,
+        "frames": recording.frames.len(),
         "notes": report.notes,
         "registration": registration,
     }))?;

@@ -1,6 +1,7 @@
 //! `hingecast eval`: a run against the truth, by the definitions of docs/metrics.md.
 //! The only code outside the tests that opens a truth folder.
 
+mod film;
 pub mod joints;
 pub mod matching;
 pub mod parts;
@@ -73,9 +74,9 @@ impl Evaluation {
 /// When the run is unfinished, or run and truth are not of the same recording.
 pub fn evaluate(run: &Path, truth: &Path, progress: &Progress) -> Result<Evaluation> {
     let folder = RunFolder::open_finished(run)?;
-    let truth = Truth::open(truth)?;
+    let mut truth = Truth::open(truth)?;
     let twin = TwinFile::read(run)?;
-    let recording = recording_of(&folder, &truth)?;
+    let recording = recording_of(&folder, &mut truth)?;
     twin.fits(run, recording.n_states, &Joints::read(run)?.tree)?;
     let cache = ViewCache::new(&recording, 512 << 20);
 
@@ -114,9 +115,13 @@ pub fn evaluate(run: &Path, truth: &Path, progress: &Progress) -> Result<Evaluat
     Ok(evaluation)
 }
 
-/// The run's recording, if the truth is of it.
-fn recording_of(folder: &RunFolder, truth: &Truth) -> Result<Recording> {
+/// The run's recording, if the truth is of it. The truth of a film gets the recording's states.
+fn recording_of(folder: &RunFolder, truth: &mut Truth) -> Result<Recording> {
     let recording = crate::prepare::recording_of(folder)?;
+    if recording.film && !truth.film_times.is_empty() {
+        film::by_time(truth, &recording)?;
+        return Ok(recording);
+    }
     if recording.n_states != truth.n_states {
         return Err(Failure::new(
             format!("the recording has {} states, the truth {}", recording.n_states, truth.n_states),

@@ -35,8 +35,8 @@ pub struct PartsEvaluation {
 /// When the stage is not done, or the truth is not of this recording.
 pub fn evaluate_parts(run: &Path, truth: &Path) -> Result<PartsEvaluation> {
     let folder = RunFolder::open(run)?;
-    let truth = Truth::open(truth)?;
-    recording_of(&folder, &truth)?;
+    let mut truth = Truth::open(truth)?;
+    recording_of(&folder, &mut truth)?;
     let found = Parts::read(run)?;
     // Where pictures had a say, theirs is the last word.
     let tree = if folder.has("joints") { Joints::read(run)?.tree } else { found.tree };

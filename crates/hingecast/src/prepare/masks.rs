@@ -23,7 +23,8 @@ pub fn find_masks(
     progress: &Progress,
 ) -> Result<MaskReport> {
     let mut depths = RawDepths::new(recording);
-    let found = object_masks(&mut depths, wanted, recording.up, seed, progress).map_err(|e| failure(e, recording))?;
+    let found = object_masks(&mut depths, wanted, recording.film, recording.up, seed, progress)
+        .map_err(|e| failure(e, recording))?;
     for (state, masks) in found.masks.iter().enumerate() {
         for (frame, mask) in recording.frames_of(state, Split::Train).into_iter().zip(masks) {
             let path = folder.join(mask_name(recording, frame));

@@ -5,6 +5,7 @@
 //! run's folder `prepare/` and leaves the recording alone.
 
 mod examine;
+mod film;
 mod masks;
 mod page;
 mod raw_depths;
@@ -27,6 +28,7 @@ use std::time::Instant;
 use words::failure;
 
 pub use examine::check;
+pub use film::{FILM_STATES, Film, HandReport, film, film_sentences};
 pub use hingecast_prepare::Wanted;
 pub use masks::{find_masks, place_at};
 pub use page::write_page;
@@ -49,6 +51,9 @@ pub struct Prepared {
     pub registration: Option<Registration>,
     /// How the object was found, where there were no masks. Its masks lie beside.
     pub masks: Option<MaskReport>,
+    /// The hands in a film. Their pixels lie beside.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub hands: Option<HandReport>,
     /// Of every state: the frame of the object as state 0 has it, from the recording's; where it
     /// was pushed as a whole. Empty: never.
     #[serde(default)]
@@ -61,7 +66,8 @@ pub struct Prepared {
 impl Prepared {
     /// Whether the recording was as it should be.
     fn is_nothing(&self) -> bool {
-        self.cameras.is_empty() && self.registration.is_none() && self.masks.is_none() && self.pushes.is_empty()
+        let in_place = self.cameras.is_empty() && self.registration.is_none() && self.pushes.is_empty();
+        in_place && self.masks.is_none() && self.hands.is_none()
     }
 }
 
@@ -191,7 +197,8 @@ fn prepared(
 ) -> Result<Prepared> {
     let needs = Needs::of(recording)?;
     let mut prepared = Prepared::default();
-    if needs.registration || needs.masks {
+    // The pictures of a film were placed on its scan when they were imported.
+    if (needs.registration || needs.masks) && !recording.film {
         prepared.cameras = settle(recording, progress)?;
     }
     if needs.registration {
@@ -206,9 +213,17 @@ fn prepared(
         prepared.doubts.clone_from(&report.doubts);
         prepared.masks = Some(report);
     }
-    let (pushes, doubts) = take_pushes_out(recording, seed, progress)?;
-    prepared.pushes = pushes;
-    prepared.doubts.extend(doubts);
+    if recording.film {
+        let hands = film::find_hands(recording, at, seed, progress)?;
+        watcher.say(&film::hands_sentence(&hands));
+        prepared.doubts.extend(film::hands_doubt(&hands));
+        prepared.hands = Some(hands);
+    } else {
+        // A hand that comes and goes looks like a push.
+        let (pushes, doubts) = take_pushes_out(recording, seed, progress)?;
+        prepared.pushes = pushes;
+        prepared.doubts.extend(doubts);
+    }
     prepared.doubts.iter().for_each(|d| watcher.say(&format!("doubt: {d}")));
     Ok(prepared)
 }
@@ -255,6 +270,14 @@ fn restore(recording: &mut Recording, at: &Path) -> Result<Prepared> {
             let mask: PathBuf = at.join(mask_name(recording, frame));
             if recording.frames[frame].split == Split::Train && mask.is_file() {
                 recording.frames[frame].mask = Some(mask);
+            }
+        }
+    }
+    if prepared.hands.is_some() {
+        for frame in 0..recording.frames.len() {
+            let hand: PathBuf = at.join(film::hand_name(recording, frame));
+            if recording.frames[frame].split == Split::Train && hand.is_file() {
+                recording.frames[frame].occluder_mask = Some(hand);
             }
         }
     }

@@ -27,9 +27,14 @@ impl RawDepths {
         Self { cache: ViewCache::new(recording, KEPT), frames, masked: false }
     }
 
+    /// All views with their masks.
+    pub fn all_masked(recording: &Recording) -> Self {
+        Self { masked: true, ..Self::new(recording) }
+    }
+
     /// Some views of every state, with their masks.
     pub fn masked(recording: &Recording) -> Self {
-        let mut own = Self { masked: true, ..Self::new(recording) };
+        let mut own = Self::all_masked(recording);
         for frames in &mut own.frames {
             let n = frames.len().min(SOME);
             *frames = (0..n).map(|k| frames[k * frames.len() / n]).collect();

@@ -21,10 +21,14 @@ pub(super) fn moved(clouds: &[Cloud], witnesses: &[Vec<Witness>], lattice: &Latt
         .map(|s| {
             let cloud = &clouds[s];
             let free = |x: Vec3| {
+                // States with fewer views than that are asked together.
+                let mut single = 0;
                 (0..witnesses.len()).filter(|r| *r != s).any(|r| {
                     let (through, on) = counted(&witnesses[r], x, 0.0);
                     // Cameras that are a little off look past edges; the others do not.
-                    through >= WITNESSES && through > on
+                    let few = witnesses[r].len() < WITNESSES;
+                    single += usize::from(few && through > on);
+                    (through >= WITNESSES && through > on) || single >= WITNESSES
                 })
             };
             let raw: Vec<bool> = cloud.points.par_iter().map(|x| free(*x)).collect();

@@ -10,6 +10,8 @@ mod pieces;
 mod pixels;
 mod planes;
 
+pub(crate) use pixels::without_blobs;
+
 use crate::error::PrepareError;
 use crate::scan::chosen;
 use glam::{DMat3, DVec3, Vec3};
@@ -80,7 +82,9 @@ pub(crate) struct Room {
     pub moved: Vec<Vec<bool>>,
 }
 
-/// Finds the object in recordings without masks, by what a person says about it. Pixels of class `OBJECT` are those with depth;
+/// Finds the object in recordings without masks, by what a person says about it. `film`: state 0 is a
+/// scan, and the others are pictures of a film in which hands move the object; the object is what
+/// leaves where the scan saw it, and hands are in the film's masks. Pixels of class `OBJECT` are those with depth;
 /// cameras of all states are in one frame, in which `up` is up.
 ///
 /// # Errors
@@ -89,6 +93,7 @@ pub(crate) struct Room {
 pub fn object_masks(
     depths: &mut dyn Depths,
     wanted: &Wanted,
+    film: bool,
     up: DVec3,
     seed: u64,
     progress: &Progress,
@@ -104,8 +109,7 @@ pub fn object_masks(
         witnesses.push(Witness::some(&views, ACROSS));
     }
     let moved = changed::moved(&clouds, &witnesses, &lattice);
-    drop(witnesses);
-    let room = Room { lattice, clouds, moved };
+    let mut room = Room { lattice, clouds, moved };
     let count: usize = room.moved.iter().flatten().filter(|m| **m).count();
     if count < FEW_MOVED && *wanted == Wanted::Moving {
         return Err(PrepareError::NothingMoved { samples: count });
@@ -113,7 +117,12 @@ pub fn object_masks(
     let mut supports = planes::supports(&room, up.as_vec3(), seed);
     planes::widen(&mut supports, &depths.views(0)?, lattice.voxel);
     let mut pieces = Pieces::new(lattice);
-    for state in 0..n {
+    if film {
+        // Hands and arms would connect what does not touch.
+        room.clouds.truncate(1);
+        room.moved.truncate(1);
+    }
+    for state in 0..room.clouds.len() {
         progress.report(n + state, 2 * n, "what moves")?;
         pieces.add(&depths.views(state)?, &supports);
     }
@@ -137,7 +146,11 @@ pub fn object_masks(
     for state in 0..n {
         progress.report(state, n, "masks")?;
         let views = depths.views(state)?;
-        let own = pixels::masks(&views, &object, &supports);
+        let own = if film && state > 0 {
+            pixels::of_film(&views, &object, &supports, &witnesses[0])
+        } else {
+            pixels::masks(&views, &object, &supports)
+        };
         shares.push(pixels::share(&views, &own));
         masks.push(own);
     }

@@ -172,7 +172,7 @@ impl Pieces {
 }
 
 /// Whether a pixel hangs between the surfaces beside it.
-fn flies(view: &DepthView, i: usize, w: usize) -> bool {
+pub(super) fn flies(view: &DepthView, i: usize, w: usize) -> bool {
     let z = view.depth[i];
     let jump = JUMP / view.camera.fx as f32 * z * 2.0;
     let off = |j: Option<usize>| {

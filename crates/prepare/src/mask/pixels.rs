@@ -1,8 +1,10 @@
 //! From the object's cells to its pixels.
 
-use super::pieces::Object;
+use super::pieces::{Object, flies};
 use super::place;
 use super::planes::Plane;
+use glam::Vec3;
+use hingecast_articulate::observe::witness::{Witness, counted};
 use hingecast_articulate::{DepthView, OBJECT};
 use rayon::prelude::*;
 
@@ -10,21 +12,40 @@ use rayon::prelude::*;
 const AROUND: isize = 3;
 /// Blobs of fewer pixels are specks.
 const SPECK: usize = 12;
+/// What moves reaches at most so far beyond where it rested, diagonals of the object.
+const REACH: f32 = 0.75;
 /// An object that touches the border in this share of the views is cut off.
 const CUT: f64 = 0.5;
 
 /// The masks of a state's views: 1 = object.
 pub(super) fn masks(views: &[DepthView], object: &Object, supports: &[Plane]) -> Vec<Vec<u8>> {
-    views.par_iter().map(|view| mask(view, object, supports)).collect()
+    views.par_iter().map(|view| mask(view, supports, &|x, _| object.has(x))).collect()
 }
 
-fn mask(view: &DepthView, object: &Object, supports: &[Plane]) -> Vec<u8> {
+/// The masks of pictures of a film, of which `scan` shows the object with nobody near: the scan's
+/// object, what stands where the scan looked through, not farther off than the object may reach, and what
+/// the scan could not see inside the object's box. Hands are in them.
+pub(super) fn of_film(views: &[DepthView], object: &Object, supports: &[Plane], scan: &[Witness]) -> Vec<Vec<u8>> {
+    let (lo, hi) = object.bounds();
+    let (reach, voxel) = (Vec3::splat(REACH * (hi - lo).length()), object.lattice.voxel);
+    let within = |x: Vec3, around: Vec3| x.cmpge(lo - around).all() && x.cmple(hi + around).all();
+    let own = |view: &DepthView, x: Vec3, i: usize| {
+        let (through, on) = counted(scan, x, 0.0);
+        let (moved, unseen) = (through >= 2 && through > on, through + on == 0);
+        let near = moved && within(x, reach) || unseen && within(x, Vec3::splat(voxel));
+        object.has(x) || near && !flies(view, i, view.camera.width)
+    };
+    views.par_iter().map(|view| mask(view, supports, &|x, i| own(view, x, i))).collect()
+}
+
+/// `has`: whether a place, world frame, that a pixel shows is the object's.
+fn mask(view: &DepthView, supports: &[Plane], has: &(dyn Fn(Vec3, usize) -> bool + Sync)) -> Vec<u8> {
     let world_from_camera = view.camera.camera_from_world.inverse();
     let (rot, trans) = (world_from_camera.mat3().as_mat3(), world_from_camera.trans.as_vec3());
     let (w, h) = (view.camera.width, view.camera.height);
     let is_object = |i: usize| {
         let x = place(view, &rot, trans, i)?;
-        Some(object.has(x) && !supports.iter().any(|p| p.holds(x, view.depth[i])))
+        Some(!supports.iter().any(|p| p.holds(x, view.depth[i])) && has(x, i))
     };
     let known: Vec<Option<bool>> = (0..w * h).map(is_object).collect();
     // Where depth is missing, the neighbours decide.
@@ -46,13 +67,13 @@ fn mask(view: &DepthView, object: &Object, supports: &[Plane]) -> Vec<u8> {
         u8::from(yes > no)
     };
     let mut mask: Vec<u8> = (0..w * h).map(filled).collect();
-    without_specks(&mut mask, w, 1);
-    without_specks(&mut mask, w, 0);
+    without_blobs(&mut mask, w, 1, SPECK);
+    without_blobs(&mut mask, w, 0, SPECK);
     mask
 }
 
-/// Turns connected blobs of `value` that are smaller than a speck into the other value.
-fn without_specks(mask: &mut [u8], w: usize, value: u8) {
+/// Turns connected blobs of `value` with fewer pixels than `least` into the other value.
+pub(crate) fn without_blobs(mask: &mut [u8], w: usize, value: u8, least: usize) {
     let mut seen = vec![false; mask.len()];
     for start in 0..mask.len() {
         if seen[start] || mask[start] != value {
@@ -76,7 +97,7 @@ fn without_specks(mask: &mut [u8], w: usize, value: u8) {
                 }
             }
         }
-        if blob.len() < SPECK {
+        if blob.len() < least {
             blob.iter().for_each(|&i| mask[i] = 1 - value);
         }
     }

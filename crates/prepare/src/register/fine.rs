@@ -19,7 +19,7 @@ const SAMPLES: usize = 12_000;
 /// One round of Gauss and Newton. `gate`: farthest neighbour, scene units; `scale`: residual at
 /// which a sample's weight has fallen to a quarter (Geman and McClure). Returns the pose, and
 /// the lower quartile and the median of the absolute residuals within the gate.
-pub(super) fn step(
+pub(crate) fn step(
     points: &[Vec3],
     normals: &[Vec3],
     target: &Surface,

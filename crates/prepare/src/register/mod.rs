@@ -7,7 +7,7 @@
 
 mod apart;
 mod balanced;
-mod fine;
+pub(crate) mod fine;
 mod pair;
 mod steady;
 mod votes;

@@ -36,7 +36,10 @@ impl Placement {
         });
         let own = (config.world.frames != Frames::Shared).then(|| {
             let moved = |s: usize| s > 0 && s < config.states;
-            let frame = |s: usize| if moved(s) { own_frame(config, s, 1.0 / metres_per_unit) } else { Pose::IDENTITY };
+            // A film is one capture, with one frame.
+            let capture = |s: usize| if config.film.is_some() { s.min(1) } else { s };
+            let frame =
+                |s: usize| if moved(s) { own_frame(config, capture(s), 1.0 / metres_per_unit) } else { Pose::IDENTITY };
             (0..times.len()).map(frame).collect()
         });
         Self { world_from_object: pushed.unwrap_or_default(), recording_from_world: own.unwrap_or_default() }
