@@ -14,7 +14,9 @@ mod foreign;
 mod format;
 mod grid;
 mod join;
+mod labels;
 mod lens;
+mod masks;
 mod nerfstudio;
 mod numbers;
 mod paris;
@@ -52,13 +54,24 @@ pub struct Config {
     pub every: usize,
     /// At most so many training pictures a state, evenly spread.
     pub max_views: usize,
+    /// Folders of masks named as the colour images are, one a source; empty: those of the source.
+    pub masks: Vec<PathBuf>,
+    /// Numbers that are the object in masks with one a thing; empty: what the source says, or all but 0.
+    pub mask_ids: Vec<u16>,
 }
 
 impl Default for Config {
     /// ARKit's low confidence is depth it made up at edges. 120 views show a thing from all sides;
     /// a film has thousands, which cost time and add no side.
     fn default() -> Self {
-        Self { format: Format::Auto, min_confidence: 1, every: 1, max_views: 120 }
+        Self {
+            format: Format::Auto,
+            min_confidence: 1,
+            every: 1,
+            max_views: 120,
+            masks: Vec::new(),
+            mask_ids: Vec::new(),
+        }
     }
 }
 
@@ -96,6 +109,8 @@ pub(crate) struct Shot {
     /// Of the depth, pixel by pixel.
     pub confidence: Option<Grid>,
     pub mask: MaskFrom,
+    /// Numbers of label images that are the object; empty: all but 0.
+    pub mask_ids: Vec<u16>,
     /// Pixels that a hand hides.
     pub occluder: Option<PathBuf>,
     /// The person hides the object.
@@ -118,6 +133,7 @@ impl Shot {
             depth_least: 0.0,
             confidence: None,
             mask: MaskFrom::Alpha,
+            mask_ids: Vec::new(),
             occluder: None,
             occluded: false,
             time: None,
@@ -175,6 +191,7 @@ pub fn import<P: AsRef<Path>>(
     progress: &Progress,
 ) -> Result<ImportReport, CaptureError> {
     not_a_source(sources, out)?;
+    masks::one_a_source(sources.len(), config)?;
     crate::synth::may_be_replaced(out)?;
     let mut scratch = Scratch::new(out);
     // Sources and where they are read: zip files are unpacked.
@@ -212,7 +229,7 @@ fn convert<P: AsRef<Path>>(
     let several = sources.len() > 1;
     let mut formats = Vec::new();
     let mut parts = Vec::new();
-    for src in sources.iter().map(P::as_ref) {
+    for (i, src) in sources.iter().map(P::as_ref).enumerate() {
         progress.check()?;
         let at = find(src, scratch)?;
         found.push((at.clone(), src.to_path_buf()));
@@ -223,12 +240,18 @@ fn convert<P: AsRef<Path>>(
             let hint = "check that the folder is complete, or name another --format";
             return Err(CaptureError::new(what, src.display().to_string(), hint));
         }
+        if let Some(folder) = config.masks.get(i) {
+            masks::beside(&mut source, &at, folder)?;
+        }
         thin::thin(&mut source, config);
         film::take_out(&mut source.shots, scratch)?;
         formats.push(format);
         parts.push((src.to_path_buf(), source));
     }
     let mut source = join::join(parts)?;
+    if !config.mask_ids.is_empty() {
+        source.shots.iter_mut().for_each(|s| s.mask_ids.clone_from(&config.mask_ids));
+    }
     let name = recording_name(sources, out);
     let (recording, notes) = store::store(&source, &name, out, config.min_confidence, progress)?;
     source.notes.extend(notes);

@@ -103,6 +103,7 @@ pub(super) fn write(
         depth: Some(file("depth")),
         depth_scale,
         mask,
+        mask_ids: Vec::new(),
         occluded: e.occluded,
         occluder_mask: e.occluder.as_ref().map(|_| file("occluder")),
         time: None,

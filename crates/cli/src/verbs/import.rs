@@ -13,6 +13,8 @@ pub fn run(session: &Session, args: &Import) -> Result<Outcome> {
         min_confidence: args.min_confidence,
         every: args.every,
         max_views: args.max_views,
+        masks: args.masks.clone(),
+        mask_ids: args.mask_id.clone(),
     };
     let report = import(&args.sources, &args.out, &config, &session.ui.stage("import"))?;
     report.notes.iter().for_each(|note| session.ui.say(&format!("note: {note}")));

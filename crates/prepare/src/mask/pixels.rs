@@ -8,6 +8,16 @@ use rayon::prelude::*;
 
 /// Pixels around one without depth that say what it is.
 const AROUND: isize = 3;
+/// Beyond this share of z, times pixels, depth around a pixel has an edge.
+const EDGE: f32 = 4.0;
+/// It flies if it is off both, the front and the back, by this share of that.
+const BETWEEN: f32 = 0.2;
+/// A pixel that is half in front of an edge measures as far behind the front as it is before the
+/// back, on a bar of one pixel twice as far: how far is looked, and in how many steps.
+const NEARER: f32 = 2.0;
+const STEPS: usize = 12;
+/// Pixels without depth that hang together are void from this share of the picture on.
+const VOID: f64 = 0.02;
 /// Blobs of fewer pixels are specks.
 const SPECK: usize = 12;
 /// An object that touches the border in this share of the views is cut off.
@@ -26,21 +36,45 @@ fn mask(view: &DepthView, object: &Object, supports: &[Plane]) -> Vec<u8> {
         let x = place(view, &rot, trans, i)?;
         Some(object.has(x) && !supports.iter().any(|p| p.holds(x, view.depth[i])))
     };
-    let known: Vec<Option<bool>> = (0..w * h).map(is_object).collect();
-    // Where depth is missing, the neighbours decide.
-    let filled = |i: usize| {
-        if let Some(own) = known[i] {
-            return u8::from(own);
+    let plain: Vec<Option<bool>> = (0..w * h).map(is_object).collect();
+    // Time-of-flight cameras mix front and back at edges: such a pixel goes with what it is nearer to.
+    let settled = |i: usize| {
+        let own = plain[i]?;
+        let Some(Edge { front, back }) = Edge::at(view, i) else { return Some(own) };
+        let (z, near, far) = (view.depth[i], view.depth[front], view.depth[back]);
+        if z - near > far - z {
+            return plain[back];
         }
-        let (x, y) = ((i % w) as isize, (i / w) as isize);
-        let (mut yes, mut no) = (0, 0);
-        for v in (y - AROUND).max(0)..=(y + AROUND).min(h as isize - 1) {
-            for u in (x - AROUND).max(0)..=(x + AROUND).min(w as isize - 1) {
-                match known[v as usize * w + u as usize] {
-                    Some(true) => yes += 1,
-                    Some(false) => no += 1,
-                    None => {}
+        let eye = trans;
+        let x = place(view, &rot, trans, i)?;
+        let on_the_way = || {
+            (1..=STEPS).any(|k| {
+                let nearer = 1.0 - NEARER * (far - z) / z * k as f32 / STEPS as f32;
+                nearer > 0.0 && {
+                    let x = eye + nearer * (x - eye);
+                    object.has(x) && !supports.iter().any(|p| p.holds(x, nearer * z))
                 }
+            })
+        };
+        Some(own || plain[front] == Some(true) || on_the_way())
+    };
+    let known: Vec<Option<bool>> = (0..w * h).map(settled).collect();
+    // Where nothing comes back in a large piece there is sky, or a room beyond reach.
+    let mut void = vec![false; w * h];
+    for blob in blobs(w * h, w, |i| known[i].is_none()).filter(|b| b.len() as f64 > VOID * (w * h) as f64) {
+        blob.into_iter().for_each(|i| void[i] = true);
+    }
+    // Where depth is missing else, the neighbours decide.
+    let filled = |i: usize| {
+        if void[i] || known[i].is_some() {
+            return u8::from(known[i] == Some(true));
+        }
+        let (mut yes, mut no) = (0, 0);
+        for j in around(i, AROUND, w, h) {
+            match known[j] {
+                Some(true) => yes += 1,
+                Some(false) => no += 1,
+                None => no += usize::from(void[j]),
             }
         }
         u8::from(yes > no)
@@ -51,12 +85,53 @@ fn mask(view: &DepthView, object: &Object, supports: &[Plane]) -> Vec<u8> {
     mask
 }
 
+/// An edge of the depth around a pixel: the pixels that are in front and at the back of it.
+struct Edge {
+    front: usize,
+    back: usize,
+}
+
+impl Edge {
+    /// `None` where the surface goes on all around, or the pixel is one of the front or of the back.
+    fn at(view: &DepthView, i: usize) -> Option<Self> {
+        let (w, h) = (view.camera.width, view.camera.height);
+        let (mut front, mut back) = (i, i);
+        for j in around(i, 1, w, h).filter(|j| view.class[*j] == OBJECT) {
+            front = if view.depth[j] < view.depth[front] { j } else { front };
+            back = if view.depth[j] > view.depth[back] { j } else { back };
+        }
+        let jump = EDGE / view.camera.fx as f32 * view.depth[i];
+        let (near, z, far) = (view.depth[front], view.depth[i], view.depth[back]);
+        // What is the nearest itself may be a bar that is too thin to have a pixel of its own.
+        let own = far - z < BETWEEN * jump;
+        (far - near > jump && !own).then_some(Self { front, back })
+    }
+}
+
+/// Pixels at most `reach` away along both axes, row by row.
+fn around(i: usize, reach: isize, w: usize, h: usize) -> impl Iterator<Item = usize> {
+    let (x, y) = ((i % w) as isize, (i / w) as isize);
+    let rows = (y - reach).max(0)..=(y + reach).min(h as isize - 1);
+    rows.flat_map(move |v| {
+        ((x - reach).max(0)..=(x + reach).min(w as isize - 1)).map(move |u| v as usize * w + u as usize)
+    })
+}
+
 /// Turns connected blobs of `value` that are smaller than a speck into the other value.
 fn without_specks(mask: &mut [u8], w: usize, value: u8) {
-    let mut seen = vec![false; mask.len()];
-    for start in 0..mask.len() {
-        if seen[start] || mask[start] != value {
-            continue;
+    let old = mask.to_vec();
+    for blob in blobs(old.len(), w, |i| old[i] == value).filter(|b| b.len() < SPECK) {
+        blob.into_iter().for_each(|i| mask[i] = 1 - value);
+    }
+}
+
+/// Connected pixels that are `wanted`, of a picture of `n` pixels and width `w`; in the order of their first
+/// ones.
+fn blobs(n: usize, w: usize, wanted: impl Fn(usize) -> bool) -> impl Iterator<Item = Vec<usize>> {
+    let mut seen = vec![false; n];
+    (0..n).filter_map(move |start| {
+        if seen[start] || !wanted(start) {
+            return None;
         }
         seen[start] = true;
         let (mut blob, mut next) = (vec![start], 0);
@@ -67,19 +142,17 @@ fn without_specks(mask: &mut [u8], w: usize, value: u8) {
                 (!i.is_multiple_of(w)).then(|| i - 1),
                 (i % w + 1 < w).then_some(i + 1),
                 i.checked_sub(w),
-                Some(i + w).filter(|j| *j < mask.len()),
+                Some(i + w).filter(|j| *j < n),
             ];
             for j in beside.into_iter().flatten() {
-                if !seen[j] && mask[j] == value {
+                if !seen[j] && wanted(j) {
                     seen[j] = true;
                     blob.push(j);
                 }
             }
         }
-        if blob.len() < SPECK {
-            blob.iter().for_each(|&i| mask[i] = 1 - value);
-        }
-    }
+        Some(blob)
+    })
 }
 
 /// Share of the pixels with depth that are the object's.
