@@ -3,6 +3,7 @@
 use super::pieces::Object;
 use super::place;
 use super::planes::Plane;
+use glam::Vec3;
 use hingecast_articulate::{DepthView, OBJECT};
 use rayon::prelude::*;
 
@@ -10,8 +11,6 @@ use rayon::prelude::*;
 const AROUND: isize = 3;
 /// Beyond this share of z, times pixels, depth around a pixel has an edge.
 const EDGE: f32 = 4.0;
-/// It flies if it is off both, the front and the back, by this share of that.
-const BETWEEN: f32 = 0.2;
 /// A pixel that is half in front of an edge measures as far behind the front as it is before the
 /// back, on a bar of one pixel twice as far: how far is looked, and in how many steps.
 const NEARER: f32 = 2.0;
@@ -37,43 +36,34 @@ fn mask(view: &DepthView, object: &Object, supports: &[Plane]) -> Vec<u8> {
         Some(object.has(x) && !supports.iter().any(|p| p.holds(x, view.depth[i])))
     };
     let plain: Vec<Option<bool>> = (0..w * h).map(is_object).collect();
-    // Time-of-flight cameras mix front and back at edges: such a pixel goes with what it is nearer to.
-    let settled = |i: usize| {
-        let own = plain[i]?;
-        let Some(Edge { front, back }) = Edge::at(view, i) else { return Some(own) };
-        let (z, near, far) = (view.depth[i], view.depth[front], view.depth[back]);
-        if z - near > far - z {
-            return plain[back];
-        }
-        let eye = trans;
-        let x = place(view, &rot, trans, i)?;
-        let on_the_way = || {
-            (1..=STEPS).any(|k| {
-                let nearer = 1.0 - NEARER * (far - z) / z * k as f32 / STEPS as f32;
-                nearer > 0.0 && {
-                    let x = eye + nearer * (x - eye);
-                    object.has(x) && !supports.iter().any(|p| p.holds(x, nearer * z))
-                }
-            })
-        };
-        Some(own || plain[front] == Some(true) || on_the_way())
-    };
-    let known: Vec<Option<bool>> = (0..w * h).map(settled).collect();
+    // Time-of-flight cameras mix front and back at edges: what is nearer to the front is the front's.
+    let known: Vec<Option<bool>> = (0..w * h)
+        .map(|i| {
+            let own = plain[i]?;
+            let Some(Edge { front, back }) = Edge::at(view, i).filter(|_| !own) else { return Some(own) };
+            let (z, near, far) = (view.depth[i], view.depth[front], view.depth[back]);
+            if z - near > far - z {
+                return Some(false);
+            }
+            let x = place(view, &rot, trans, i)?;
+            Some(plain[front] == Some(true) || in_front(object, supports, trans, x, z, NEARER * (far - z)))
+        })
+        .collect();
     // Where nothing comes back in a large piece there is sky, or a room beyond reach.
     let mut void = vec![false; w * h];
     for blob in blobs(w * h, w, |i| known[i].is_none()).filter(|b| b.len() as f64 > VOID * (w * h) as f64) {
         blob.into_iter().for_each(|i| void[i] = true);
     }
-    // Where depth is missing else, the neighbours decide.
+    // Where depth is missing, the neighbours decide; void beside an edge is half of a reason against it.
     let filled = |i: usize| {
-        if void[i] || known[i].is_some() {
-            return u8::from(known[i] == Some(true));
+        if let Some(own) = known[i] {
+            return u8::from(own);
         }
         let (mut yes, mut no) = (0, 0);
         for j in around(i, AROUND, w, h) {
             match known[j] {
-                Some(true) => yes += 1,
-                Some(false) => no += 1,
+                Some(true) => yes += 2,
+                Some(false) => no += 2,
                 None => no += usize::from(void[j]),
             }
         }
@@ -85,6 +75,14 @@ fn mask(view: &DepthView, object: &Object, supports: &[Plane]) -> Vec<u8> {
     mask
 }
 
+/// Whether the object is on the way from the camera at `eye` to `x`, at most `reach` of z before its `z`.
+fn in_front(object: &Object, supports: &[Plane], eye: Vec3, x: Vec3, z: f32, reach: f32) -> bool {
+    (1..=STEPS).map(|k| z - reach * k as f32 / STEPS as f32).filter(|nearer| *nearer > 0.0).any(|nearer| {
+        let x = eye + nearer / z * (x - eye);
+        object.has(x) && !supports.iter().any(|p| p.holds(x, nearer))
+    })
+}
+
 /// An edge of the depth around a pixel: the pixels that are in front and at the back of it.
 struct Edge {
     front: usize,
@@ -92,7 +90,7 @@ struct Edge {
 }
 
 impl Edge {
-    /// `None` where the surface goes on all around, or the pixel is one of the front or of the back.
+    /// `None` where the surface goes on all around.
     fn at(view: &DepthView, i: usize) -> Option<Self> {
         let (w, h) = (view.camera.width, view.camera.height);
         let (mut front, mut back) = (i, i);
@@ -101,10 +99,7 @@ impl Edge {
             back = if view.depth[j] > view.depth[back] { j } else { back };
         }
         let jump = EDGE / view.camera.fx as f32 * view.depth[i];
-        let (near, z, far) = (view.depth[front], view.depth[i], view.depth[back]);
-        // What is the nearest itself may be a bar that is too thin to have a pixel of its own.
-        let own = far - z < BETWEEN * jump;
-        (far - near > jump && !own).then_some(Self { front, back })
+        (view.depth[back] - view.depth[front] > jump).then_some(Self { front, back })
     }
 }
 
