@@ -19,6 +19,7 @@ use crate::pictures::information::{Information, of_parts};
 use crate::resample;
 use crate::search::discover::discover;
 use crate::shown::{Shown, shown};
+use crate::value_by_views;
 use crate::weigh_doubts::{Believed, weigh_doubts};
 use hingecast_geom::{Certainty, KinematicTree, Pose, Progress};
 
@@ -109,9 +110,8 @@ pub fn find(depths: &mut dyn Depths, config: &Config, progress: &Progress) -> Re
     )?;
     let discovery = discover(&evidence, config.max_parts, seed, progress)?;
     let cost = discovery.cost;
-    progress.report(0, 1, "refining")?;
     let (mut estimate, mut trace);
-    (evidence, estimate, trace) = settle(evidence, discovery, seed, &config.skip);
+    (evidence, estimate, trace) = settle(evidence, discovery, seed, &config.skip, progress)?;
     correct(&estimate.world_from_state, &mut cameras);
     let mut labels = label_clouds(&evidence, &estimate.tree, &estimate.owners);
     let noisy = evidence.is_noisy();
@@ -133,12 +133,11 @@ pub fn find(depths: &mut dyn Depths, config: &Config, progress: &Progress) -> Re
         drop(before);
         let again = Discovery::again(&evidence, estimate.tree, cost);
         let second;
-        (evidence, estimate, second) = settle(evidence, again, seed, &config.skip);
+        (evidence, estimate, second) = settle(evidence, again, seed, &config.skip, progress)?;
         trace.extend(second);
         correct(&estimate.world_from_state, &mut cameras);
         labels = label_clouds(&evidence, &estimate.tree, &estimate.owners);
     }
-    let information = if noisy { of_parts(&evidence, &labels, &estimate) } else { Vec::new() };
     let witnesses = if estimate.tree.joints.is_empty() {
         Vec::new()
     } else {
@@ -148,13 +147,18 @@ pub fn find(depths: &mut dyn Depths, config: &Config, progress: &Progress) -> Re
         };
         (0..n_states).map(of_state).collect::<Result<_, _>>()?
     };
+    let mut said = shown(&evidence, &estimate.tree, &labels, &witnesses);
+    if value_by_views::correct(&evidence, &mut estimate, &labels, &witnesses, &said, seed) {
+        labels = label_clouds(&evidence, &estimate.tree, &estimate.owners);
+        said = shown(&evidence, &estimate.tree, &labels, &witnesses);
+    }
+    let information = if noisy { of_parts(&evidence, &labels, &estimate) } else { Vec::new() };
     let resampled = match noisy && config.resample && !estimate.tree.joints.is_empty() {
         true => resample::deviations(depths, lattice, &cameras, &estimate, seed, progress)?,
         false => Vec::new(),
     };
-    let shown = shown(&evidence, &estimate.tree, &labels, &witnesses);
     let (doubts, certainty) =
-        weigh_doubts(&evidence, &estimate, &labels, &Believed { shown: &shown, resampled: &resampled }, seed);
+        weigh_doubts(&evidence, &estimate, &labels, &Believed { shown: &said, resampled: &resampled }, seed);
     let samples = if noisy || !config.borders {
         let of_state = |(state, own): (usize, &Vec<u8>)| -> Vec<Labelled> {
             let points = &evidence.clouds[state].points;
@@ -175,7 +179,7 @@ pub fn find(depths: &mut dyn Depths, config: &Config, progress: &Progress) -> Re
         report: estimate.report,
         information,
         certainty,
-        shown,
+        shown: said,
         doubts,
         trace,
     })

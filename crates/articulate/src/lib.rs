@@ -44,6 +44,7 @@ mod resample;
 pub mod score;
 pub mod search;
 pub mod shown;
+pub mod value_by_views;
 mod weigh_doubts;
 
 pub use config::{Config, MANY_STATES};

@@ -60,7 +60,7 @@ pub fn deviations(
             return Ok(Vec::new());
         }
         let again = Discovery::again(&evidence, found.tree.clone(), found.cost);
-        let (_, other, _) = settle(evidence, again, seed, &skip);
+        let (_, other, _) = settle(evidence, again, seed, &skip, &progress.silent())?;
         for (sum, squares) in sums.iter_mut().zip(apart(&found.tree, &other.tree)) {
             (0..3).for_each(|k| sum[k] += squares[k]);
         }

@@ -57,7 +57,7 @@ impl Shown {
 /// Of every joint of `tree`. `witnesses`: some views of every state, cameras as corrected. `labels`: the part
 /// of every point of every state's cloud.
 pub fn shown(evidence: &Evidence, tree: &KinematicTree, labels: &[Vec<u8>], witnesses: &[Vec<Witness>]) -> Vec<Shown> {
-    let slack = (SLACK * evidence.lattice.voxel).max(evidence.tolerance);
+    let slack = slack(evidence);
     let n = witnesses.len();
     (0..tree.joints.len())
         .map(|j| {
@@ -71,6 +71,24 @@ pub fn shown(evidence: &Evidence, tree: &KinematicTree, labels: &[Vec<u8>], witn
             Shown { at_rest, moved, own, pairs: pairs.len(), states, contradicted }
         })
         .collect()
+}
+
+/// What a place may be off by, scene units.
+pub(crate) fn slack(evidence: &Evidence) -> f32 {
+    (SLACK * evidence.lattice.voxel).max(evidence.tolerance)
+}
+
+/// At most about `count` points of a part's surface in one state, world frame.
+pub(crate) fn some_points(
+    evidence: &Evidence,
+    labels: &[Vec<u8>],
+    state: usize,
+    part: usize,
+    count: usize,
+) -> Vec<Vec3> {
+    let own = evidence.clouds[state].points.iter().zip(&labels[state]);
+    let all: Vec<Vec3> = own.filter(|(_, l)| **l as usize == part).map(|(x, _)| *x).collect();
+    all.iter().step_by(all.len().div_ceil(count.max(1)).max(1)).copied().collect()
 }
 
 /// Two states that are compared: shares that are looked through.
@@ -107,14 +125,7 @@ fn of_state(
     slack: f32,
 ) -> Vec<Pair> {
     let joint = &tree.joints[j];
-    let all: Vec<Vec3> = evidence.clouds[s]
-        .points
-        .iter()
-        .zip(&labels[s])
-        .filter(|(_, l)| **l as usize == joint.child)
-        .map(|(x, _)| *x)
-        .collect();
-    let points: Vec<Vec3> = all.iter().step_by(all.len().div_ceil(POINTS).max(1)).copied().collect();
+    let points = some_points(evidence, labels, s, joint.child, POINTS);
     let Some(own) = looked_through(&witnesses[s], &points, &Motion::from(Pose::IDENTITY), slack) else {
         return Vec::new();
     };

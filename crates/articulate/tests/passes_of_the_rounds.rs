@@ -11,7 +11,7 @@ use glam::{DQuat, DVec3};
 use hingecast_articulate::passes::driver::settle;
 use hingecast_articulate::passes::optional_names;
 use hingecast_articulate::passes::value_search::values_beside;
-use hingecast_geom::Pose;
+use hingecast_geom::{Pose, Progress};
 
 /// A door and a drawer in five states.
 fn door_and_drawer() -> Scene {
@@ -86,7 +86,7 @@ fn a_value_beside_the_right_one() {
     let scene = drawers_open_by(&[[0.0, 0.316, 0.384, 0.353, 0.211], [0.0, 0.018, 0.345, 0.384, 0.384]]);
     let evidence = scene.evidence();
     let found = discovery(&evidence, &scene.tree);
-    let (evidence, settled, _) = settle(evidence, found, 0, &[]);
+    let (evidence, settled, _) = settle(evidence, found, 0, &[], &Progress::default()).unwrap();
     assert_tree(&settled.tree, &scene, &USUAL);
     for voxels in [-2.6, -1.2, 0.0, 0.8, 1.7] {
         let mut off = settled.tree.clone();

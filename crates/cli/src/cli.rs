@@ -210,6 +210,13 @@ pub struct Import {
     /// At most so many training pictures a state, evenly spread over what is there.
     #[arg(long, default_value_t = import::Config::default().max_views, value_name = "N", value_parser = at_least_one)]
     pub max_views: usize,
+    /// Folder of masks that are named as the colour images are, such as a segmenter writes. With several
+    /// sources once for each, in their order.
+    #[arg(long, value_name = "FOLDER")]
+    pub masks: Vec<PathBuf>,
+    /// The object's number (or numbers: 1,3) in masks that have one a thing [default: all but 0].
+    #[arg(long, value_name = "N", value_delimiter = ',', value_parser = clap::value_parser!(u16).range(1..))]
+    pub mask_id: Vec<u16>,
 }
 
 #[derive(Args, Debug)]

@@ -79,13 +79,18 @@ impl Ui {
             let bar = ProgressBar::new(1).with_prefix(format!("{name:<7}"));
             let style = ProgressStyle::with_template("{prefix} [{bar:30}] {percent:>3} %  {elapsed} eta {eta}  {msg}");
             bar.set_style(style.expect("a fixed template").progress_chars("=> "));
+            let unknown = ProgressStyle::with_template("{prefix} {elapsed}  {msg}").expect("a fixed template");
+            let (known, unknown) = (bar.style(), unknown);
             let pace = Mutex::new((Pace::default(), Instant::now()));
             return Progress::new(
                 move |done, total, note| {
-                    bar.set_length(total as u64);
-                    bar.set_position(done as u64);
                     let mut pace = pace.lock().unwrap_or_else(|e| e.into_inner());
                     let now = pace.1.elapsed().as_secs_f64();
+                    if (pace.0.total == 0) != (total == 0) {
+                        bar.set_style(if total == 0 { unknown.clone() } else { known.clone() });
+                    }
+                    bar.set_length(total as u64);
+                    bar.set_position(done as u64);
                     if pace.0.begins(done, total, now) {
                         bar.reset_eta();
                     }
@@ -108,7 +113,8 @@ impl Ui {
                     *last = Instant::now();
                     let eta = pace.eta(done, spent).map_or(String::new(), |s| format!(", eta {s:.0} s"));
                     let percent = 100.0 * done as f64 / total as f64;
-                    tell(&format!("{name:<7} {percent:>3.0} %  {spent:.0} s{eta}  {note}"));
+                    let share = if total > 0 { format!("{percent:>3.0} %") } else { "     ".to_string() };
+                    tell(&format!("{name:<7} {share}  {spent:.0} s{eta}  {note}"));
                 }
             },
             cancel,
@@ -144,7 +150,7 @@ impl Pace {
     /// Seconds to go; `None` where nothing tells.
     fn eta(&self, done: usize, now: f64) -> Option<f64> {
         let (from, since) = self.from;
-        let steps = done.checked_sub(from).filter(|n| *n > 0)?;
+        let steps = done.checked_sub(from).filter(|n| *n > 0 && self.total > 0)?;
         Some((now - since) / steps as f64 * self.total.saturating_sub(done) as f64)
     }
 }
@@ -184,5 +190,9 @@ mod tests {
         // The next stretch of the same stage.
         assert!(pace.begins(0, 50, 60.0));
         assert_eq!(pace.eta(10, 80.0), Some(80.0));
+        // Nobody knows how many there will be.
+        pace.begins(1, 0, 90.0);
+        pace.begins(2, 0, 95.0);
+        assert_eq!(pace.eta(2, 99.0), None);
     }
 }

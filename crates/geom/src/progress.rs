@@ -27,8 +27,13 @@ impl Progress {
         Self { sink: Some(Arc::new(sink)), cancel: Some(cancel) }
     }
 
+    /// The same wish to stop, and nobody who listens: for steps within a step.
+    pub fn silent(&self) -> Self {
+        Self { sink: None, cancel: self.cancel.clone() }
+    }
+
     /// Says that `done` of `total` steps are finished; `note` is a short figure such as "psnr
-    /// 31.2".
+    /// 31.2". A `total` of 0: nobody knows yet how many there will be.
     ///
     /// # Errors
     /// [`Cancelled`] when the person asked to stop: pass it up with `?`.

@@ -156,6 +156,9 @@ impl Config {
             ("track.rate[1]", self.track.rate[1] as f64, share, "share of the diagonal"),
             ("track.quat_rate", self.track.quat_rate.into(), share, "radians or so a step"),
             ("track.depth", self.track.depth.into(), from(0), "weight"),
+            ("track.physics.rigid", self.track.physics.rigid.into(), from(0), "weight"),
+            ("track.physics.rotation", self.track.physics.rotation.into(), from(0), "weight"),
+            ("track.physics.isometry", self.track.physics.isometry.into(), from(0), "weight"),
             ("parts.parts", self.parts.parts as f64, (0.0, 250.0), "a number, 0 = find out"),
             ("parts.max_parts", self.parts.max_parts as f64, (1.0, 250.0), "a number"),
             ("parts.sample", self.parts.sample as f64, (50.0, 20_000.0), "gaussians"),
@@ -169,6 +172,7 @@ impl Config {
             ("twin.max_faces", self.twin.max_faces as f64, from(4), "faces"),
             ("twin.max_hulls", self.twin.max_hulls as f64, (1.0, 1024.0), "hulls"),
             ("twin.simplify_error", self.twin.simplify_error, share, "share of the diagonal"),
+            ("twin.color_views", self.twin.color_views as f64, from(1), "images"),
             ("twin.crumbs", self.twin.crumbs, share, "share of the largest piece"),
         ];
         match checks.into_iter().find(|(_, value, (lo, hi), _)| !(value >= lo && value <= hi)) {
@@ -236,7 +240,7 @@ pub fn layered<T: Serialize + DeserializeOwned>(
 fn typed<T: DeserializeOwned>(table: &toml::Table, place: &str, words: &Words) -> Result<T> {
     toml::Value::Table(table.clone()).try_into().map_err(|e: toml::de::Error| {
         let what = e.message().lines().collect::<Vec<_>>().join("; ");
-        let what = what.replace("usize", "a whole number from 0").replace("u32", "a whole number from 0");
+        let what = ["usize", "u64", "u32"].iter().fold(what, |text, kind| text.replace(kind, "a whole number from 0"));
         Failure::new(what, place, format!("see {} for all keys", words.saved))
     })
 }
@@ -272,11 +276,14 @@ mod tests {
         let e = Config::resolve(Preset::Default, None, &["fit.stepz=9".into()]).unwrap_err();
         assert!(e.what.contains("stepz"), "{e}");
         assert_eq!(e.place, "--set fit.stepz=9");
+        let e = Config::resolve(Preset::Default, None, &["seed=-1".into()]).unwrap_err();
+        assert!(e.what.contains("a whole number from 0"), "{e}");
     }
 
     #[test]
     fn settings_that_no_stage_can_work_with_are_refused() {
-        for pair in ["fit.steps=0", "twin.voxel=0", "twin.voxel=nan", "twin.density=-1", "parts.sample=1"] {
+        let pairs = ["fit.steps=0", "twin.voxel=0", "twin.voxel=nan", "twin.density=-1", "parts.sample=1"];
+        for pair in pairs.into_iter().chain(["track.physics.rigid=nan", "twin.color_views=0"]) {
             let e = Config::resolve(Preset::Default, None, &[pair.to_string()]).unwrap_err();
             assert!(e.place.starts_with(pair.split('=').next().unwrap()), "{e}");
         }

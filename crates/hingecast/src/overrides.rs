@@ -90,7 +90,10 @@ pub fn uncouple(file: &mut Joints, entries: &[JointOverride]) {
 
 fn one(file: &mut Joints, entry: &JointOverride, size: &Extent) -> std::result::Result<(), (String, String)> {
     let names: Vec<&str> = file.tree.joints.iter().map(|j| j.name.as_str()).collect();
-    let there = format!("joint = one of: {}", names.join(", "));
+    let there = match names.is_empty() {
+        true => "leave [[joint]] out: this run found no joint".to_string(),
+        false => format!("joint = one of: {}", names.join(", ")),
+    };
     let Some(j) = names.iter().position(|n| *n == entry.joint) else {
         return Err((format!("no joint '{}'", entry.joint), there));
     };
@@ -200,6 +203,16 @@ mod tests {
         let size = Extent { lo: [0.0; 3], hi: [1.0; 3], diagonal: 1.7 };
         let entry = JointOverride { joint: "joint_1".into(), ..entry };
         apply(&mut door(), &[entry], &size).map_err(|e| e.what).err().unwrap_or_default()
+    }
+
+    #[test]
+    fn without_joints_there_is_none_to_name() {
+        let mut file = door();
+        file.tree.joints.clear();
+        let size = Extent { lo: [0.0; 3], hi: [1.0; 3], diagonal: 1.7 };
+        let entry = JointOverride { joint: "joint_1".into(), ..Default::default() };
+        let e = apply(&mut file, &[entry], &size).unwrap_err();
+        assert!(e.hint.contains("found no joint"), "{e}");
     }
 
     /// They once went into the twin without a word, and the report called them the range seen.

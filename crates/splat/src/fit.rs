@@ -115,8 +115,7 @@ pub fn fit(
 
         if relocation_due(config, state.iteration) {
             let mut rng = fastrand::Rng::with_seed(config.seed ^ (state.iteration as u64) << 20);
-            let some: Vec<_> = (0..views.count.min(8)).map(|_| (views.get)(rng.usize(..views.count))).collect();
-            report.relocated += relocate(engine, &some, state.extent, engine.len() / 20, &mut rng)?;
+            report.relocated += relocate(engine, views, state.extent, engine.len() / 20, &mut rng)?;
         }
         if recent.len() > views.count {
             recent.remove(0);

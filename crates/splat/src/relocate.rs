@@ -5,9 +5,10 @@ use crate::engine::{Engine, RenderOptions};
 use crate::error::SplatError;
 use crate::params::plane;
 use crate::target::Target;
+use crate::views::Views;
 use glam::DVec2;
 use hingecast_geom::gaussians::SH_C0;
-use std::sync::Arc;
+use std::collections::BTreeMap;
 
 /// Opacity below which a gaussian is dead.
 const DEAD_OPACITY: f32 = 0.02;
@@ -17,6 +18,9 @@ const LARGEST: f32 = 0.5;
 /// Errors smaller than this are noise of the pictures, not missing gaussians.
 const NOISE: f32 = 0.03;
 
+/// Views that are asked where the picture is wrong.
+const VIEWS: usize = 8;
+
 /// A place on the surface that the render gets wrong.
 struct Place {
     position: [f32; 3],
@@ -25,24 +29,23 @@ struct Place {
     size: f32,
 }
 
-/// Gives every dead gaussian a new life at a pixel of `targets` chosen with a probability that
-/// grows with its error. Returns how many moved. Engines with groups are left alone: a canonical
-/// place needs to know the group.
+/// Gives every dead gaussian a new life at a pixel of some views, chosen with a probability that
+/// grows with its error. Returns how many moved. With groups, a gaussian stays in its group: it goes
+/// where a gaussian of that group is seen, to the place that this is in the group's frame.
 ///
 /// # Errors
 /// As [`Engine::render`].
 pub(crate) fn relocate(
     engine: &mut Engine,
-    targets: &[Arc<Target>],
+    views: &Views,
     extent: f32,
     most: usize,
     rng: &mut fastrand::Rng,
 ) -> Result<usize, SplatError> {
-    if !engine.groups().is_empty() {
-        return Ok(0);
-    }
     let (_, second, steps) = engine.moments();
-    let never_seen = |i: usize| steps > 0 && (0..second.count()).all(|k| second.plane(k)[i] == 0.0);
+    // Only a whole pass through the views tells; a drawer's inside is in few of them.
+    let passed = steps as usize >= views.count;
+    let never_seen = |i: usize| passed && (0..second.count()).all(|k| second.plane(k)[i] == 0.0);
     let huge = |i: usize| (0..3).any(|k| engine.params().plane(plane::SCALES + k)[i].exp() > LARGEST * extent);
     let mut dead: Vec<usize> = engine
         .opacities()
@@ -55,14 +58,22 @@ pub(crate) fn relocate(
     if dead.is_empty() {
         return Ok(0);
     }
-    let per_view = dead.len().div_ceil(targets.len());
-    let mut places = Vec::new();
-    for target in targets {
-        add_places(engine, target, per_view, rng, &mut places)?;
+    let some: Vec<usize> = (0..views.count.min(VIEWS)).map(|_| rng.usize(..views.count)).collect();
+    let per_view = dead.len().div_ceil(some.len());
+    let mut places: BTreeMap<u16, Vec<Place>> = BTreeMap::new();
+    for view in some {
+        if let Some(poses) = views.poses {
+            engine.set_poses(&poses(view))?;
+        }
+        add_places(engine, &(views.get)(view), per_view, rng, &mut places)?;
     }
-    let moved = dead.len().min(places.len());
+    let groups = engine.groups().to_vec();
     let (params, first, second, _) = engine.state_mut();
-    for (&i, place) in dead.iter().zip(&places) {
+    let mut moved = 0;
+    for i in dead {
+        let group = groups.get(i).copied().unwrap_or(0);
+        let Some(place) = places.get_mut(&group).and_then(Vec::pop) else { continue };
+        moved += 1;
         for k in 0..params.count() {
             first.plane_mut(k)[i] = 0.0;
             second.plane_mut(k)[i] = 0.0;
@@ -85,18 +96,19 @@ fn add_places(
     target: &Target,
     count: usize,
     rng: &mut fastrand::Rng,
-    places: &mut Vec<Place>,
+    places: &mut BTreeMap<u16, Vec<Place>>,
 ) -> Result<(), SplatError> {
     let camera = target.camera();
     let render = engine.render(camera, &RenderOptions { background: target.background(), ..Default::default() })?;
     let rgb = target.rgb();
     let (depth, _) = target.depth_and_mask();
     let seen = render.depth_normalised();
+    let group_at = groups_seen(engine)?;
     // Cumulative error over pixels whose depth is known, by camera or by render.
     let mut cumulative = Vec::with_capacity(depth.len());
     let mut total = 0.0f64;
     for i in 0..depth.len() {
-        let known = depth[i] > 0.0 || seen[i] > 0.0;
+        let known = (depth[i] > 0.0 || seen[i] > 0.0) && group_at(i).is_some();
         let error: f32 = (0..3).map(|c| (render.rgb[3 * i + c] - rgb[3 * i + c]).abs()).sum();
         let weight = target.weight_at(i % camera.width, i / camera.width);
         if known {
@@ -112,11 +124,21 @@ fn add_places(
         let z = if depth[i] > 0.0 { depth[i] } else { seen[i] };
         let (x, y) = (i % camera.width, i / camera.width);
         let uv = DVec2::new(x as f64 + rng.f64(), y as f64 + rng.f64());
-        places.push(Place {
-            position: camera.unproject(uv, f64::from(z)).as_vec3().into(),
+        let Some(group) = group_at(i) else { continue };
+        let world = camera.unproject(uv, f64::from(z));
+        let canonical = engine.poses().get(group as usize).map_or(world, |pose| pose.inverse().apply(world));
+        places.entry(group).or_default().push(Place {
+            position: canonical.as_vec3().into(),
             colour: [rgb[3 * i], rgb[3 * i + 1], rgb[3 * i + 2]],
             size: (0.5 * f64::from(z) / camera.fx) as f32,
         });
     }
     Ok(())
+}
+
+/// Which group each pixel of the last render shows; group 0 everywhere if there are none.
+fn groups_seen(engine: &mut Engine) -> Result<impl Fn(usize) -> Option<u16> + use<>, SplatError> {
+    let groups = engine.groups().to_vec();
+    let hits = if groups.is_empty() { Vec::new() } else { engine.median()? };
+    Ok(move |i: usize| if groups.is_empty() { Some(0) } else { hits[i].map(|hit| groups[hit.gaussian as usize]) })
 }

@@ -3,7 +3,7 @@
 mod common;
 
 use glam::{DVec2, DVec3};
-use hingecast_geom::{Camera, Progress};
+use hingecast_geom::{Camera, Pose, Progress};
 use hingecast_splat::{
     Engine, FitConfig, LossConfig, Pixels, RenderOptions, SplatError, Target, TargetImages, Views, fit, initialise,
     metrics,
@@ -165,6 +165,38 @@ fn a_stopped_fit_resumes_to_the_same_bytes() {
     assert!(matches!(fit(&mut other, &views, &saved, &Progress::default()), Err(SplatError::Checkpoint { .. })));
 }
 
+/// With groups they once stayed where they were: a canonical place needs the group's pose.
+#[test]
+fn dead_gaussians_of_a_group_move_to_its_surface() {
+    let targets = targets(true);
+    let get = |i: usize| Arc::clone(&targets[i]);
+    let pose = common::poses()[1];
+    let poses = |_: usize| vec![Pose::IDENTITY, pose];
+    let views = Views { count: targets.len(), get: &get, poses: Some(&poses) };
+    let mut first = initialise(&views, 1500, 1).unwrap();
+    for m in &mut first.means {
+        *m = pose.inverse().apply(glam::Vec3::from(*m).as_dvec3()).as_vec3().into();
+    }
+    // Group 0 has one dead gaussian, far away, and nothing that any view shows: it has to stay.
+    let mut groups = vec![1u16; first.len()];
+    groups[0] = 0;
+    for i in (0..first.len()).step_by(10) {
+        first.means[i] = [3.0, 3.0, 3.0];
+        first.opacities[i] = -9.0;
+    }
+    let dead: Vec<usize> = (10..first.len()).step_by(10).collect();
+    let mut engine = Engine::from_gaussians(&first, 2).unwrap();
+    engine.set_groups(&groups, &[Pose::IDENTITY, pose]).unwrap();
+    let config = FitConfig { iterations: 200, relocate_every: 40, ..FitConfig::default() };
+    let report = fit(&mut engine, &views, &config, &Progress::default()).unwrap();
+    let after = engine.gaussians();
+    let off = |i: usize| (pose.apply(glam::Vec3::from(after.means[i]).as_dvec3()).length() - 0.5).abs();
+    let on_the_ball = dead.iter().filter(|&&i| off(i) < 0.05).count();
+    assert!(report.relocated >= dead.len(), "{} moved", report.relocated);
+    assert!(10 * on_the_ball >= 9 * dead.len(), "{on_the_ball} of {}", dead.len());
+    assert!(glam::Vec3::from(after.means[0]).length() > 4.0, "{:?}", after.means[0]);
+}
+
 #[test]
 fn a_group_pose_is_found_by_its_twist_gradient() {
     let targets = targets(true);
@@ -181,7 +213,7 @@ fn a_group_pose_is_found_by_its_twist_gradient() {
     let config = LossConfig { ssim: 0.0, ..LossConfig::default() };
     let mut gradients = hingecast_splat::Gradients::default();
     for i in 0..200 {
-        engine.set_groups(&groups, &[hingecast_geom::Pose::from_trans(at)]).unwrap();
+        engine.set_groups(&groups, &[Pose::from_trans(at)]).unwrap();
         engine.loss_and_gradients(&targets[i % targets.len()], &config, &mut gradients).unwrap();
         let g = gradients.poses[0];
         let direction = DVec3::new(g[0], g[1], g[2]).normalize_or_zero();

@@ -8,7 +8,8 @@ use crate::model::owners::Owners;
 use crate::model::tree_edit::count_from_first;
 use crate::observe::evidence::Evidence;
 use crate::score::likelihood::Likelihood;
-use hingecast_geom::Pose;
+use hingecast_geom::progress::Cancelled;
+use hingecast_geom::{Pose, Progress};
 use serde::{Deserialize, Serialize};
 use std::time::Instant;
 
@@ -35,12 +36,16 @@ const TRACED_SAMPLES: usize = 300;
 
 /// Runs all passes but those whose names are in `skip`. Answers the evidence in the states' frames
 /// as they are believed in the end.
+///
+/// # Errors
+/// The wish to stop, between two passes.
 pub fn settle(
     evidence: Evidence,
     found: Discovery,
     seed: u64,
     skip: &[String],
-) -> (Evidence, Estimate, Vec<PassRecord>) {
+    progress: &Progress,
+) -> Result<(Evidence, Estimate, Vec<PassRecord>), Cancelled> {
     let mut evidence = evidence;
     let likelihood = Likelihood::of_some(&found.verdicts[0], seed, TRACED_SAMPLES);
     let n_parts = found.tree.parts.len();
@@ -58,6 +63,8 @@ pub fn settle(
     let mut nats = likelihood.nats(&evidence, &estimate.tree);
     let mut records = Vec::new();
     for (number, pass) in schedule() {
+        // One pass takes a hundred times as long as another: no share, no time to go.
+        progress.report(number + 1, 0, &format!("refining: {}", pass.name.replace('_', " ")))?;
         let (began, before) = (Instant::now(), estimate.tree.clone());
         let skipped = pass.optional && skip.iter().any(|name| name == pass.name);
         if !skipped {
@@ -85,5 +92,5 @@ pub fn settle(
     estimate.unexplained = (0..n).filter(against).count() as f64 / n.max(1) as f64;
     estimate.report.sigmas.resize(estimate.tree.joints.len(), [0.0; 3]);
     count_from_first(&mut estimate.tree);
-    (evidence, estimate, records)
+    Ok((evidence, estimate, records))
 }

@@ -39,7 +39,8 @@ pub fn discover(evidence: &Evidence, max_parts: usize, seed: u64, progress: &Pro
     let mut best: Option<Partial> = None;
     let width = if n_states < MANY_STATES { BEAM } else { 1 };
     for round in 0..max_parts {
-        progress.report(round, max_parts, &format!("{} parts", round + 1))?;
+        // How many parts there will be nobody knows: no share of the work, no time to go.
+        progress.report(round + 1, 0, &format!("looking for part {}", round + 1))?;
         let mut next: Vec<Partial> = Vec::new();
         for node in front {
             let grown = grow(evidence, &node, width, cost, seed);

@@ -6,7 +6,7 @@ use hingecast_articulate::model::estimate::Discovery;
 use hingecast_articulate::observe::evidence::Evidence;
 use hingecast_articulate::passes::driver::settle;
 use hingecast_articulate::score::part_cost::PartCost;
-use hingecast_geom::{KinematicTree, Pose};
+use hingecast_geom::{KinematicTree, Pose, Progress};
 
 /// As if the search had found `tree` on `evidence`.
 pub fn discovery(evidence: &Evidence, tree: &KinematicTree) -> Discovery {
@@ -19,7 +19,7 @@ pub fn settled(scene: &Scene, tree: &KinematicTree, skip: &[&str]) -> KinematicT
     let evidence = scene.evidence();
     let found = discovery(&evidence, tree);
     let names: Vec<String> = skip.iter().map(|name| name.to_string()).collect();
-    let tree = settle(evidence, found, 0, &names).1.tree;
+    let tree = settle(evidence, found, 0, &names, &Progress::default()).expect("nobody stops it").1.tree;
     eprintln!("without {skip:?}: {} parts", tree.parts.len());
     tree
 }

@@ -2,6 +2,7 @@
 //! make sense.
 
 use super::{Finding, Fix, Severity, address, error, warning};
+use crate::recording::mask;
 use crate::recording::transforms::Document;
 use crate::{CaptureError, Recording, View};
 use glam::{DVec2, DVec3};
@@ -30,6 +31,8 @@ pub(super) struct Look {
     /// Depth [scene units], 0 = unknown, empty without depth; and object mask.
     pub depth: Vec<f32>,
     pub object: Vec<u8>,
+    /// Pixels of each number of a mask that has several, where nobody said which is the object.
+    labels: BTreeMap<u16, usize>,
     hash: u128,
 }
 
@@ -72,7 +75,12 @@ pub(super) fn check(
             let bytes =
                 std::fs::read(&recording.frames[i].color).map_err(|e| CaptureError::read(&recording.root, e))?;
             let has_mask = recording.frames[i].mask.is_some() || view.mask.contains(&0);
-            Ok(Look::new(&view, has_mask, xxh3_128(&bytes)))
+            let mut look = Look::new(&view, has_mask, xxh3_128(&bytes));
+            let frame = &recording.frames[i];
+            if let Some(path) = frame.mask.as_ref().filter(|_| frame.mask_ids.is_empty() || !view.mask.contains(&1)) {
+                look.labels = mask::labels(path)?;
+            }
+            Ok(look)
         })
         .collect();
     progress.check()?;
@@ -133,6 +141,7 @@ impl Look {
             step,
             depth: (0..n).map(at).map(|i| if usable(i) { view.depth[i] } else { 0.0 }).collect(),
             object: (0..width * height).map(at).map(|i| view.mask[i] & view.usable[i]).collect(),
+            labels: BTreeMap::new(),
             hash,
         }
     }
@@ -167,6 +176,32 @@ fn masks(documents: &[Document], recording: &Recording, looks: &[Option<Look>], 
     if known.is_empty() {
         return;
     }
+    let mut numbers = BTreeMap::<u16, usize>::new();
+    known.iter().flat_map(|(_, l)| &l.labels).for_each(|(id, n)| *numbers.entry(*id).or_insert(0) += n);
+    let chosen = known.iter().map(|(i, _)| &recording.frames[*i].mask_ids).find(|ids| !ids.is_empty());
+    if numbers.len() > 1 {
+        let place = recording.root.display().to_string();
+        match chosen {
+            None => {
+                let what = format!(
+                    "masks have {} numbers, all taken for the object: {}",
+                    numbers.len(),
+                    mask::listed(&numbers)
+                );
+                let hint = "right if they are parts of one thing; else name the object's: \"mask_id\": N in transforms.json, \
+                            or hingecast import --mask-id N";
+                out.push(warning("mask-labels", what, place, hint));
+            }
+            Some(ids) if known.iter().all(|(_, l)| l.mask == 0.0) => {
+                let ids: Vec<String> = ids.iter().map(u16::to_string).collect();
+                let what = format!("no pixel of any mask is {}", ids.join(" or "));
+                let hint = format!("the numbers of the masks are {}: correct mask_id", mask::listed(&numbers));
+                out.push(error("mask-labels", CaptureError::new(what, format!("{place}: mask_id"), hint)));
+                return;
+            }
+            Some(_) => {}
+        }
+    }
     // An inverted mask covers the border of the picture and spares its middle.
     let inverted: Vec<usize> =
         known.iter().filter(|(_, l)| l.border > 0.8 && l.middle < l.border - 0.2).map(|(i, _)| *i).collect();
@@ -176,7 +211,8 @@ fn masks(documents: &[Document], recording: &Recording, looks: &[Option<Look>], 
         let place = format!("{place}: {}", path.display());
         let hint = "the object should be white, the background black: invert the masks";
         let e = CaptureError::new("a mask seems inverted: it covers the border and spares the middle", place, hint);
-        let fix = recording.frames[i].mask.is_some().then_some(Fix::InvertMask { file, index });
+        let plain = recording.frames[i].mask.is_some() && recording.frames[i].mask_ids.is_empty();
+        let fix = plain.then_some(Fix::InvertMask { file, index });
         out.push(Finding { fix, ..error("mask-inverted", e) });
     }
     for (i, look) in known.into_iter().filter(|(i, _)| !inverted.contains(i)) {

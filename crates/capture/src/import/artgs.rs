@@ -54,6 +54,7 @@ fn read_file(src: &Path, file: &Path, state: usize, split: Split, shots: &mut Ve
             film_frame: None,
             mask: beside(&color, "mask").map_or(MaskFrom::Alpha, MaskFrom::File),
             occluder: None,
+            mask_ids: Vec::new(),
             occluded: false,
             time: None,
             color,

@@ -38,6 +38,7 @@ pub(super) fn read(src: &Path) -> Result<Vec<Shot>, CaptureError> {
             film_frame: None,
             mask: mask.map_or(MaskFrom::Alpha, MaskFrom::File),
             occluder: None,
+            mask_ids: Vec::new(),
             occluded: false,
             time: None,
         });

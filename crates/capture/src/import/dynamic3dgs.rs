@@ -39,6 +39,7 @@ pub(super) fn read(src: &Path) -> Result<Vec<Shot>, CaptureError> {
                     film_frame: None,
                     mask: if seg.is_file() { MaskFrom::File(seg) } else { MaskFrom::Alpha },
                     occluder: None,
+                    mask_ids: Vec::new(),
                     occluded: false,
                     time: Some(t as f64),
                 });

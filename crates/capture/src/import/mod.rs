@@ -14,7 +14,9 @@ mod foreign;
 mod format;
 mod grid;
 mod join;
+mod labels;
 mod lens;
+mod masks;
 mod nerfstudio;
 mod numbers;
 mod paris;
@@ -55,6 +57,10 @@ pub struct Config {
     /// The last of two sources is a film in which hands move the parts that the first, a scan, shows
     /// at rest; of a film, at most so many pictures. Its states are cut later, by who sees depth.
     pub film: Option<usize>,
+    /// Folders of masks named as the colour images are, one a source; empty: those of the source.
+    pub masks: Vec<PathBuf>,
+    /// Numbers that are the object in masks with one a thing; empty: what the source says, or all but 0.
+    pub mask_ids: Vec<u16>,
 }
 
 /// Pictures of a film that are kept at most: fifteen seconds at 26 a second.
@@ -64,7 +70,15 @@ impl Default for Config {
     /// ARKit's low confidence is depth it made up at edges. 120 views show a thing from all sides;
     /// a film has thousands, which cost time and add no side.
     fn default() -> Self {
-        Self { format: Format::Auto, min_confidence: 1, every: 1, max_views: 120, film: None }
+        Self {
+            format: Format::Auto,
+            min_confidence: 1,
+            every: 1,
+            max_views: 120,
+            masks: Vec::new(),
+            mask_ids: Vec::new(),
+            film: None,
+        }
     }
 }
 
@@ -102,6 +116,8 @@ pub(crate) struct Shot {
     /// Of the depth, pixel by pixel.
     pub confidence: Option<Grid>,
     pub mask: MaskFrom,
+    /// Numbers of label images that are the object; empty: all but 0.
+    pub mask_ids: Vec<u16>,
     /// Pixels that a hand hides.
     pub occluder: Option<PathBuf>,
     /// The person hides the object.
@@ -124,6 +140,7 @@ impl Shot {
             depth_least: 0.0,
             confidence: None,
             mask: MaskFrom::Alpha,
+            mask_ids: Vec::new(),
             occluder: None,
             occluded: false,
             time: None,
@@ -183,6 +200,7 @@ pub fn import<P: AsRef<Path>>(
     progress: &Progress,
 ) -> Result<ImportReport, CaptureError> {
     not_a_source(sources, out)?;
+    masks::one_a_source(sources.len(), config)?;
     crate::synth::may_be_replaced(out)?;
     let mut scratch = Scratch::new(out);
     // Sources and where they are read: zip files are unpacked.
@@ -225,7 +243,7 @@ fn convert<P: AsRef<Path>>(
     }
     let mut formats = Vec::new();
     let mut parts = Vec::new();
-    for src in sources.iter().map(P::as_ref) {
+    for (i, src) in sources.iter().map(P::as_ref).enumerate() {
         progress.check()?;
         let at = find(src, scratch)?;
         found.push((at.clone(), src.to_path_buf()));
@@ -235,6 +253,9 @@ fn convert<P: AsRef<Path>>(
             let what = format!("no training pictures were found for the layout {}", format.name());
             let hint = "check that the folder is complete, or name another --format";
             return Err(CaptureError::new(what, src.display().to_string(), hint));
+        }
+        if let Some(folder) = config.masks.get(i) {
+            masks::beside(&mut source, &at, folder)?;
         }
         match config.film.filter(|_| parts.len() == 1) {
             Some(most) => thin::thin(&mut source, &Config { max_views: most, every: 1, ..config.clone() }),
@@ -246,6 +267,9 @@ fn convert<P: AsRef<Path>>(
     }
     let mut source = join::join(parts)?;
     source.film = config.film.is_some();
+    if !config.mask_ids.is_empty() {
+        source.shots.iter_mut().for_each(|s| s.mask_ids.clone_from(&config.mask_ids));
+    }
     let name = recording_name(sources, out);
     let (recording, notes) = store::store(&source, &name, out, config.min_confidence, progress)?;
     source.notes.extend(notes);

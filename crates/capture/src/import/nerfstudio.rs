@@ -53,6 +53,7 @@ pub(super) fn read(src: &Path, one_state: bool) -> Result<Source, CaptureError> 
                 confidence: None,
                 film_frame: None,
                 mask: e.mask.clone().map_or(MaskFrom::Alpha, MaskFrom::File),
+                mask_ids: e.mask_ids.clone(),
                 occluder: e.occluder_mask.clone(),
                 occluded: e.occluded,
                 time: e.time,

@@ -39,6 +39,7 @@ pub(super) fn read(src: &Path) -> Result<Vec<Shot>, CaptureError> {
                     film_frame: None,
                     mask: MaskFrom::Alpha,
                     occluder: None,
+                    mask_ids: Vec::new(),
                     occluded: false,
                     time: None,
                 });

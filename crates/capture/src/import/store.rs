@@ -4,6 +4,7 @@
 //! Depth is never enlarged: where it is smaller than the colour (every phone), colour, mask and
 //! camera are brought to its size. Where it is larger, it is brought to the colour's.
 
+use super::labels;
 use super::resize::{Size, area_average, majority, nearest, nearest_known, same_shape};
 use super::{MaskFrom, Shot, Source};
 use crate::recording::{images, mask};
@@ -51,6 +52,7 @@ pub(super) fn store(
         })
         .collect::<Result<_, CaptureError>>()?;
     let (frames, changes): (Vec<Frame>, Vec<Change>) = stored.into_iter().unzip();
+    labels::some_is_object(shots, &changes.iter().map(|c| (c.object, &c.labels)).collect::<Vec<_>>())?;
     let train_states = frames.iter().filter(|f| f.split == Split::Train).map(|f| f.state + 1).max().unwrap_or(0);
     let recording = Recording {
         root: work.path.clone(),
@@ -69,7 +71,9 @@ pub(super) fn store(
     }
     work.finish()?;
     // What was written should open; if not, the source has gaps in its states.
-    Ok((Recording::open(&out)?, notes(&changes, min_confidence)))
+    let mut notes = notes(&changes, min_confidence);
+    notes.extend(labels::note(shots, changes.iter().map(|c| &c.labels)));
+    Ok((Recording::open(&out)?, notes))
 }
 
 /// What happened to a picture on its way.
@@ -79,6 +83,10 @@ struct Change {
     /// Pixels with depth, and of these those whose confidence was too low.
     known: usize,
     unsure: usize,
+    /// Pixels of the object, where there is a mask.
+    object: Option<usize>,
+    /// Pixels of each number, where the mask has several.
+    labels: BTreeMap<u16, usize>,
 }
 
 fn notes(changes: &[Change], min_confidence: u8) -> Vec<String> {
@@ -120,7 +128,8 @@ fn one(shot: &Shot, view: usize, root: &Path, min_confidence: u8) -> Result<(Fra
             "import the pictures of the size that the cameras were computed for",
         ));
     }
-    let mut change = Change { color: size, depth: None, known: 0, unsure: 0 };
+    let mut change =
+        Change { color: size, depth: None, known: 0, unsure: 0, object: None, labels: labels::of(&shot.mask)? };
     let mut depth = None;
     if shot.depth.is_some() {
         let (values, depth_size) = depth_map(shot, min_confidence, &mut change)?;
@@ -140,12 +149,13 @@ fn one(shot: &Shot, view: usize, root: &Path, min_confidence: u8) -> Result<(Fra
     let rgba = image.into_rgba8().into_raw();
     let alpha = || rgba.chunks_exact(4).map(|p| if p[3] > 127 { 255 } else { 0 }).collect::<Vec<u8>>();
     let mask = match &shot.mask {
-        MaskFrom::File(path) => Some(mask_file(path, to)?),
-        MaskFrom::Any(paths) => Some(any_mask(paths, to)?),
+        MaskFrom::File(path) => Some(mask_file(path, &shot.mask_ids, to)?),
+        MaskFrom::Any(paths) => Some(any_mask(paths, &shot.mask_ids, to)?),
         MaskFrom::Alpha if has_alpha => Some(majority(&alpha(), size, to)),
         MaskFrom::Alpha => None,
     };
-    let hidden = shot.occluder.as_ref().map(|path| mask_file(path, to)).transpose()?;
+    change.object = mask.as_ref().map(|m| m.iter().filter(|v| **v > 0).count());
+    let hidden = shot.occluder.as_ref().map(|path| mask_file(path, &[], to)).transpose()?;
     let rgb: Vec<u8> = rgba.chunks_exact(4).flat_map(over_white).collect();
     let rgb = if to == size { rgb } else { area_average::<3>(&rgb, size, to) };
     let picture = Picture { rgb, mask, depth, hidden };
@@ -175,6 +185,7 @@ fn one(shot: &Shot, view: usize, root: &Path, min_confidence: u8) -> Result<(Fra
         depth: picture.depth.as_ref().map(|_| file("depth")),
         depth_scale,
         mask: picture.mask.as_ref().map(|_| file("mask")),
+        mask_ids: Vec::new(),
         occluded: shot.occluded,
         occluder_mask: picture.hidden.as_ref().map(|_| file("occluder")),
         time: shot.time,
@@ -207,8 +218,8 @@ struct Picture {
 
 /// 0 or 255 at the size wanted: by majority where it is larger, by the nearest pixel where it is
 /// smaller.
-fn mask_file(path: &Path, to: Size) -> Result<Vec<u8>, CaptureError> {
-    let (mask, w, h) = mask::read(path)?;
+fn mask_file(path: &Path, ids: &[u16], to: Size) -> Result<Vec<u8>, CaptureError> {
+    let (mask, w, h) = mask::read(path, ids)?;
     let from = (w, h);
     if smaller(to, from) {
         return Ok(majority(&mask, from, to));
@@ -217,10 +228,10 @@ fn mask_file(path: &Path, to: Size) -> Result<Vec<u8>, CaptureError> {
 }
 
 /// 255 where one of the files says so.
-fn any_mask(paths: &[PathBuf], to: Size) -> Result<Vec<u8>, CaptureError> {
+fn any_mask(paths: &[PathBuf], ids: &[u16], to: Size) -> Result<Vec<u8>, CaptureError> {
     let mut all = vec![0; to.0 * to.1];
     for path in paths {
-        all.iter_mut().zip(mask_file(path, to)?).for_each(|(a, m)| *a |= m);
+        all.iter_mut().zip(mask_file(path, ids, to)?).for_each(|(a, m)| *a |= m);
     }
     Ok(all)
 }

@@ -57,6 +57,17 @@ impl<'a> Fields<'a> {
         }
     }
 
+    /// A number from 1 to 65535 or a list of such; an absent key is an empty list.
+    pub fn ids(&self, key: &str) -> Result<Vec<u16>, CaptureError> {
+        let Some(value) = self.get(key) else { return Ok(Vec::new()) };
+        let one = |v: &Value| v.as_u64().and_then(|n| u16::try_from(n).ok()).filter(|n| *n > 0);
+        let all = match value {
+            Value::Array(list) => list.iter().map(one).collect::<Option<Vec<u16>>>().filter(|l| !l.is_empty()),
+            other => one(other).map(|n| vec![n]),
+        };
+        all.ok_or_else(|| self.wrong(key, value, "a number of the label images, from 1, or a list of such"))
+    }
+
     pub fn text(&self, key: &str) -> Result<Option<&'a str>, CaptureError> {
         match self.get(key) {
             None | Some(Value::Null) => Ok(None),

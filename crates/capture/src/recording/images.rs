@@ -11,7 +11,13 @@ use std::path::Path;
 /// # Errors
 /// When the file is missing, cut short, or of a format that is not known.
 pub fn read(path: &Path) -> Result<DynamicImage, CaptureError> {
-    let bytes = std::fs::read(path).map_err(|e| {
+    let bytes = bytes(path)?;
+    image::load_from_memory(&bytes).map_err(|e| broken(path, bytes.len(), &e))
+}
+
+/// The bytes of an image file.
+pub(super) fn bytes(path: &Path) -> Result<Vec<u8>, CaptureError> {
+    std::fs::read(path).map_err(|e| {
         let what =
             if e.kind() == std::io::ErrorKind::NotFound { "an image is missing" } else { "cannot read an image" };
         CaptureError::new(
@@ -19,14 +25,16 @@ pub fn read(path: &Path) -> Result<DynamicImage, CaptureError> {
             path.display().to_string(),
             "copy the file again, or drop its frame: hingecast check --fix",
         )
-    })?;
-    image::load_from_memory(&bytes).map_err(|e| {
-        CaptureError::new(
-            format!("an image cannot be decoded: {e}"),
-            format!("{} ({} bytes)", path.display(), bytes.len()),
-            "it is cut short or no PNG or JPEG: copy or export it again, or drop its frame: hingecast check --fix",
-        )
     })
+}
+
+/// What to say of an image that cannot be decoded.
+pub(super) fn broken(path: &Path, len: usize, e: &dyn std::fmt::Display) -> CaptureError {
+    CaptureError::new(
+        format!("an image cannot be decoded: {e}"),
+        format!("{} ({len} bytes)", path.display()),
+        "it is cut short or no PNG or JPEG: copy or export it again, or drop its frame: hingecast check --fix",
+    )
 }
 
 /// Depth in stored units (h*w, row-major) with its size: grey PNG of 8 or 16 bits, or .npy of (h,

@@ -31,11 +31,15 @@ pub fn new_folder(recording: &Recording) -> Result<PathBuf, CaptureError> {
 /// When a file cannot be read or written.
 pub fn write(recording: &Recording) -> Result<(), CaptureError> {
     for mut document in transforms::read(&recording.root)? {
+        // What was found is one thing, whatever numbers others had.
+        document.value.as_object_mut().into_iter().for_each(|top| drop(top.remove("mask_id")));
         let folder = document.file.parent().unwrap_or(Path::new("")).to_path_buf();
         for entry in &document.entries {
             let own = recording.frames.iter().find(|f| f.color == entry.color && f.state == entry.state);
             let Some(mask) = own.and_then(|f| f.mask.as_ref()) else { continue };
-            document.value["frames"][entry.index]["mask_path"] = json!(relative(mask, &folder));
+            let frame = &mut document.value["frames"][entry.index];
+            frame.as_object_mut().into_iter().for_each(|f| drop(f.remove("mask_id")));
+            frame["mask_path"] = json!(relative(mask, &folder));
         }
         crate::check::backup(&document.file)?;
         let text = serde_json::to_vec_pretty(&document.value).map_err(|e| CaptureError::write(&document.file, e))?;

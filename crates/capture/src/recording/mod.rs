@@ -14,6 +14,7 @@ pub mod images;
 pub(crate) mod mask;
 pub mod masked;
 mod packed_depth;
+mod palette;
 mod stray;
 pub(crate) mod transforms;
 mod view;
@@ -58,6 +59,8 @@ pub struct Frame {
     pub depth_scale: f64,
     /// The object's mask (non-zero = object), if there is one.
     pub mask: Option<PathBuf>,
+    /// Numbers that are the object, where masks have one a thing; empty: all but 0.
+    pub mask_ids: Vec<u16>,
     /// The whole frame is hidden by the person: leave it out.
     pub occluded: bool,
     /// Pixels that show the person instead of the object (non-zero = hidden).
@@ -212,6 +215,7 @@ fn frame(entry: &Entry, default_view: usize) -> Result<Frame, CaptureError> {
         depth: entry.depth.clone(),
         depth_scale: entry.depth_scale,
         mask: entry.mask.clone(),
+        mask_ids: entry.mask_ids.clone(),
         occluded: entry.occluded,
         occluder_mask: entry.occluder_mask.clone(),
         time: entry.time,

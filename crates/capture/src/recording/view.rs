@@ -54,12 +54,12 @@ pub(crate) fn load(f: &Frame) -> Result<View, CaptureError> {
         }
     };
     let mask = match (&f.mask, alpha) {
-        (Some(path), _) => binary(path, w, h)?,
+        (Some(path), _) => binary(path, &f.mask_ids, w, h)?,
         (None, Some(alpha)) => alpha,
         (None, None) => vec![1; w * h],
     };
     let usable = match &f.occluder_mask {
-        Some(path) => binary(path, w, h)?.into_iter().map(|hidden| 1 - hidden).collect(),
+        Some(path) => binary(path, &[], w, h)?.into_iter().map(|hidden| 1 - hidden).collect(),
         None => vec![1; w * h],
     };
     Ok(View { camera: f.camera, rgb, depth, mask, usable })
@@ -74,8 +74,8 @@ fn over_white(rgba: &[u8]) -> (Vec<u8>, Vec<u8>) {
 }
 
 /// A mask image as 0 and 1.
-pub(crate) fn binary(path: &Path, w: usize, h: usize) -> Result<Vec<u8>, CaptureError> {
-    let (mask, mw, mh) = super::mask::read(path)?;
+pub(crate) fn binary(path: &Path, ids: &[u16], w: usize, h: usize) -> Result<Vec<u8>, CaptureError> {
+    let (mask, mw, mh) = super::mask::read(path, ids)?;
     same_size(path, (mw, mh), (w, h))?;
     Ok(mask)
 }

@@ -70,6 +70,9 @@ fn frame(root: &Path, f: &Frame, own_intrinsics: bool) -> Value {
     path("depth_file_path", &f.depth);
     path("mask_path", &f.mask);
     path("occluder_mask_path", &f.occluder_mask);
+    if !f.mask_ids.is_empty() {
+        out.insert("mask_id".into(), json!(f.mask_ids));
+    }
     if f.depth.is_some() {
         out.insert("depth_unit_scale_factor".into(), json!(f.depth_scale));
     }

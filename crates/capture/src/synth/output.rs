@@ -110,6 +110,7 @@ pub(super) fn write(
         depth: Some(file("depth")),
         depth_scale,
         mask,
+        mask_ids: Vec::new(),
         occluded: e.occluded,
         occluder_mask: occluder.map(|_| file("occluder")),
         time: None,

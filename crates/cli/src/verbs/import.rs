@@ -16,6 +16,8 @@ pub fn run(session: &Session, args: &Import) -> Result<Outcome> {
         every: args.every,
         max_views: args.max_views,
         film: args.film.as_ref().map(|_| args.film_pictures),
+        masks: args.masks.clone(),
+        mask_ids: args.mask_id.clone(),
     };
     let report = import(&sources, &args.out, &config, &session.ui.stage("import"))?;
     report.notes.iter().for_each(|note| session.ui.say(&format!("note: {note}")));

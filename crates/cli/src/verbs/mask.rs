@@ -29,7 +29,7 @@ pub fn run(session: &Session, args: &Mask) -> Result<Outcome> {
     let report = prepare::find_masks(&mut settled, &wanted, &folder, args.seed, &progress)?;
     drop(progress);
     for (frame, found) in recording.frames.iter_mut().zip(settled.frames) {
-        frame.mask = found.mask;
+        (frame.mask, frame.mask_ids) = (found.mask, found.mask_ids);
     }
     masked::write(&recording)?;
     let sheet = folder.with_extension("png");

@@ -56,6 +56,7 @@ mod tests {
             mask: None,
             occluded: false,
             occluder_mask: None,
+            mask_ids: Vec::new(),
             time: Some(time),
         };
         let of =

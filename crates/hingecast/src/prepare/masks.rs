@@ -32,6 +32,7 @@ pub fn find_masks(
             let bytes: Vec<u8> = mask.iter().map(|m| 255 * m).collect();
             images::write_gray(&path, &bytes, camera.width, camera.height)?;
             recording.frames[frame].mask = Some(path);
+            recording.frames[frame].mask_ids.clear();
         }
     }
     Ok(found.report)

@@ -270,6 +270,7 @@ fn restore(recording: &mut Recording, at: &Path) -> Result<Prepared> {
             let mask: PathBuf = at.join(mask_name(recording, frame));
             if recording.frames[frame].split == Split::Train && mask.is_file() {
                 recording.frames[frame].mask = Some(mask);
+                recording.frames[frame].mask_ids.clear();
             }
         }
     }

@@ -11,6 +11,11 @@ use std::collections::BTreeMap;
 
 /// Pixels, over all views and states, that make a cell count.
 const PIXELS: u16 = 3;
+/// Pieces hang together by cells with at least this share of the pixels that the middle one of the
+/// cells has: between things that stand close, a few pixels that fly fill a cell here and there.
+const FIRM: f64 = 0.2;
+/// Cells around firm ones that go with them: so many rounds.
+const ROUNDS: usize = 2;
 /// Of the views that look at a cell close to a wall, the share whose pixels must lie in it, and how close
 /// that is, tolerances of the wall.
 const SEEN: f64 = 0.25;
@@ -126,9 +131,21 @@ impl Pieces {
         (self.grown(&piece, &own), on as f64 / all.max(1) as f64)
     }
 
+    /// Pixels that make a cell hold a piece together.
+    fn firm(&self) -> u16 {
+        let mut full: Vec<u16> = self.counts.iter().copied().filter(|c| *c >= PIXELS).collect();
+        let middle = full.len() / 2;
+        if full.is_empty() {
+            return PIXELS;
+        }
+        let median = *full.select_nth_unstable(middle).1;
+        PIXELS.max((FIRM * f64::from(median)).round() as u16)
+    }
+
     /// The piece of every cell, from 1, 0 where nothing is; and how many there are.
     fn pieces(&self) -> (Vec<u32>, u32) {
-        let full = |i: usize| self.counts[i] >= PIXELS;
+        let firm = self.firm();
+        let full = |i: usize| self.counts[i] >= firm;
         let mut piece = vec![0u32; self.counts.len()];
         let mut count = 0;
         for start in 0..piece.len() {
@@ -139,34 +156,36 @@ impl Pieces {
             piece[start] = count;
             let mut open = vec![start];
             while let Some(i) = open.pop() {
-                let at = self.lattice.coords(i);
-                let (lo, hi) = (at - TOUCH, at + TOUCH);
-                for z in lo.z..=hi.z {
-                    for y in lo.y..=hi.y {
-                        for x in lo.x..=hi.x {
-                            let Some(j) = self.lattice.index_of(IVec3::new(x, y, z)) else { continue };
-                            if piece[j] == 0 && full(j) {
-                                piece[j] = count;
-                                open.push(j);
-                            }
-                        }
+                for j in self.around(i, TOUCH) {
+                    if piece[j] == 0 && full(j) {
+                        piece[j] = count;
+                        open.push(j);
                     }
                 }
             }
         }
+        // Cells that few pixels hit - a door seen slantwise - go with those around them.
+        for _ in 0..ROUNDS {
+            let joins = |i: usize| {
+                let free = piece[i] == 0 && self.counts[i] > 0;
+                free.then(|| self.around(i, 1).map(|j| piece[j]).filter(|p| *p > 0).min()).flatten()
+            };
+            let joined: Vec<(usize, u32)> = (0..piece.len()).filter_map(|i| Some((i, joins(i)?))).collect();
+            joined.into_iter().for_each(|(i, p)| piece[i] = p);
+        }
         (piece, count)
+    }
+
+    /// Cells at most `reach` away along every axis, in order.
+    fn around(&self, i: usize, reach: i32) -> impl Iterator<Item = usize> + '_ {
+        let (at, n) = (self.lattice.coords(i), 2 * reach + 1);
+        let offsets = (0..n * n * n).map(move |k| IVec3::new(k % n, k / n % n, k / (n * n)) - reach);
+        offsets.filter_map(move |o| self.lattice.index_of(at + o))
     }
 
     /// The cells of some pieces.
     fn grown(&self, piece: &[u32], own: &[bool]) -> Object {
-        // Cells that few pixels hit - a door seen slantwise - go with those around them.
-        let around = |i: usize| {
-            let at = self.lattice.coords(i);
-            let near = (0..27).map(|k| at + IVec3::new(k % 3 - 1, k / 3 % 3 - 1, k / 9 - 1));
-            near.into_iter().filter_map(|c| self.lattice.index_of(c)).any(|j| own[piece[j] as usize])
-        };
-        let is_own = |i: usize| own[piece[i] as usize] || (piece[i] == 0 && self.counts[i] > 0 && around(i));
-        let cells = (0..piece.len()).map(is_own).collect();
+        let cells = piece.iter().map(|p| own[*p as usize]).collect();
         Object { lattice: self.lattice, cells }
     }
 }

@@ -10,6 +10,14 @@ use rayon::prelude::*;
 
 /// Pixels around one without depth that say what it is.
 const AROUND: isize = 3;
+/// Beyond this share of z, times pixels, depth around a pixel has an edge.
+const EDGE: f32 = 4.0;
+/// A pixel that is half in front of an edge measures as far behind the front as it is before the
+/// back, on a bar of one pixel twice as far: how far is looked, and in how many steps.
+const NEARER: f32 = 2.0;
+const STEPS: usize = 12;
+/// Pixels without depth that hang together are void from this share of the picture on.
+const VOID: f64 = 0.02;
 /// Blobs of fewer pixels are specks.
 const SPECK: usize = 12;
 /// What moves reaches at most so far beyond where it rested, diagonals of the object.
@@ -19,7 +27,7 @@ const CUT: f64 = 0.5;
 
 /// The masks of a state's views: 1 = object.
 pub(super) fn masks(views: &[DepthView], object: &Object, supports: &[Plane]) -> Vec<Vec<u8>> {
-    views.par_iter().map(|view| mask(view, supports, &|x, _| object.has(x))).collect()
+    views.par_iter().map(|view| mask(view, object, supports, &|x, _| object.has(x))).collect()
 }
 
 /// The masks of pictures of a film, of which `scan` shows the object with nobody near: the scan's
@@ -35,11 +43,11 @@ pub(super) fn of_film(views: &[DepthView], object: &Object, supports: &[Plane], 
         let near = moved && within(x, reach) || unseen && within(x, Vec3::splat(voxel));
         object.has(x) || near && !flies(view, i, view.camera.width)
     };
-    views.par_iter().map(|view| mask(view, supports, &|x, i| own(view, x, i))).collect()
+    views.par_iter().map(|view| mask(view, object, supports, &|x, i| own(view, x, i))).collect()
 }
 
 /// `has`: whether a place, world frame, that a pixel shows is the object's.
-fn mask(view: &DepthView, supports: &[Plane], has: &(dyn Fn(Vec3, usize) -> bool + Sync)) -> Vec<u8> {
+fn mask(view: &DepthView, object: &Object, supports: &[Plane], has: &(dyn Fn(Vec3, usize) -> bool + Sync)) -> Vec<u8> {
     let world_from_camera = view.camera.camera_from_world.inverse();
     let (rot, trans) = (world_from_camera.mat3().as_mat3(), world_from_camera.trans.as_vec3());
     let (w, h) = (view.camera.width, view.camera.height);
@@ -47,21 +55,36 @@ fn mask(view: &DepthView, supports: &[Plane], has: &(dyn Fn(Vec3, usize) -> bool
         let x = place(view, &rot, trans, i)?;
         Some(!supports.iter().any(|p| p.holds(x, view.depth[i])) && has(x, i))
     };
-    let known: Vec<Option<bool>> = (0..w * h).map(is_object).collect();
-    // Where depth is missing, the neighbours decide.
+    let plain: Vec<Option<bool>> = (0..w * h).map(is_object).collect();
+    // Time-of-flight cameras mix front and back at edges: what is nearer to the front is the front's.
+    let known: Vec<Option<bool>> = (0..w * h)
+        .map(|i| {
+            let own = plain[i]?;
+            let Some(Edge { front, back }) = Edge::at(view, i).filter(|_| !own) else { return Some(own) };
+            let (z, near, far) = (view.depth[i], view.depth[front], view.depth[back]);
+            if z - near > far - z {
+                return Some(false);
+            }
+            let x = place(view, &rot, trans, i)?;
+            Some(plain[front] == Some(true) || in_front(object, supports, trans, x, z, NEARER * (far - z)))
+        })
+        .collect();
+    // Where nothing comes back in a large piece there is sky, or a room beyond reach.
+    let mut void = vec![false; w * h];
+    for blob in blobs(w * h, w, |i| known[i].is_none()).filter(|b| b.len() as f64 > VOID * (w * h) as f64) {
+        blob.into_iter().for_each(|i| void[i] = true);
+    }
+    // Where depth is missing, the neighbours decide; void beside an edge is half of a reason against it.
     let filled = |i: usize| {
         if let Some(own) = known[i] {
             return u8::from(own);
         }
-        let (x, y) = ((i % w) as isize, (i / w) as isize);
         let (mut yes, mut no) = (0, 0);
-        for v in (y - AROUND).max(0)..=(y + AROUND).min(h as isize - 1) {
-            for u in (x - AROUND).max(0)..=(x + AROUND).min(w as isize - 1) {
-                match known[v as usize * w + u as usize] {
-                    Some(true) => yes += 1,
-                    Some(false) => no += 1,
-                    None => {}
-                }
+        for j in around(i, AROUND, w, h) {
+            match known[j] {
+                Some(true) => yes += 2,
+                Some(false) => no += 2,
+                None => no += usize::from(void[j]),
             }
         }
         u8::from(yes > no)
@@ -72,12 +95,58 @@ fn mask(view: &DepthView, supports: &[Plane], has: &(dyn Fn(Vec3, usize) -> bool
     mask
 }
 
+/// Whether the object is on the way from the camera at `eye` to `x`, at most `reach` of z before its `z`.
+fn in_front(object: &Object, supports: &[Plane], eye: Vec3, x: Vec3, z: f32, reach: f32) -> bool {
+    (1..=STEPS).map(|k| z - reach * k as f32 / STEPS as f32).filter(|nearer| *nearer > 0.0).any(|nearer| {
+        let x = eye + nearer / z * (x - eye);
+        object.has(x) && !supports.iter().any(|p| p.holds(x, nearer))
+    })
+}
+
+/// An edge of the depth around a pixel: the pixels that are in front and at the back of it.
+struct Edge {
+    front: usize,
+    back: usize,
+}
+
+impl Edge {
+    /// `None` where the surface goes on all around.
+    fn at(view: &DepthView, i: usize) -> Option<Self> {
+        let (w, h) = (view.camera.width, view.camera.height);
+        let (mut front, mut back) = (i, i);
+        for j in around(i, 1, w, h).filter(|j| view.class[*j] == OBJECT) {
+            front = if view.depth[j] < view.depth[front] { j } else { front };
+            back = if view.depth[j] > view.depth[back] { j } else { back };
+        }
+        let jump = EDGE / view.camera.fx as f32 * view.depth[i];
+        (view.depth[back] - view.depth[front] > jump).then_some(Self { front, back })
+    }
+}
+
+/// Pixels at most `reach` away along both axes, row by row.
+fn around(i: usize, reach: isize, w: usize, h: usize) -> impl Iterator<Item = usize> {
+    let (x, y) = ((i % w) as isize, (i / w) as isize);
+    let rows = (y - reach).max(0)..=(y + reach).min(h as isize - 1);
+    rows.flat_map(move |v| {
+        ((x - reach).max(0)..=(x + reach).min(w as isize - 1)).map(move |u| v as usize * w + u as usize)
+    })
+}
+
 /// Turns connected blobs of `value` with fewer pixels than `least` into the other value.
 pub(crate) fn without_blobs(mask: &mut [u8], w: usize, value: u8, least: usize) {
-    let mut seen = vec![false; mask.len()];
-    for start in 0..mask.len() {
-        if seen[start] || mask[start] != value {
-            continue;
+    let old = mask.to_vec();
+    for blob in blobs(old.len(), w, |i| old[i] == value).filter(|b| b.len() < least) {
+        blob.into_iter().for_each(|i| mask[i] = 1 - value);
+    }
+}
+
+/// Connected pixels that are `wanted`, of a picture of `n` pixels and width `w`; in the order of their first
+/// ones.
+fn blobs(n: usize, w: usize, wanted: impl Fn(usize) -> bool) -> impl Iterator<Item = Vec<usize>> {
+    let mut seen = vec![false; n];
+    (0..n).filter_map(move |start| {
+        if seen[start] || !wanted(start) {
+            return None;
         }
         seen[start] = true;
         let (mut blob, mut next) = (vec![start], 0);
@@ -88,19 +157,17 @@ pub(crate) fn without_blobs(mask: &mut [u8], w: usize, value: u8, least: usize) 
                 (!i.is_multiple_of(w)).then(|| i - 1),
                 (i % w + 1 < w).then_some(i + 1),
                 i.checked_sub(w),
-                Some(i + w).filter(|j| *j < mask.len()),
+                Some(i + w).filter(|j| *j < n),
             ];
             for j in beside.into_iter().flatten() {
-                if !seen[j] && mask[j] == value {
+                if !seen[j] && wanted(j) {
                     seen[j] = true;
                     blob.push(j);
                 }
             }
         }
-        if blob.len() < least {
-            blob.iter().for_each(|&i| mask[i] = 1 - value);
-        }
-    }
+        Some(blob)
+    })
 }
 
 /// Share of the pixels with depth that are the object's.
