@@ -220,3 +220,34 @@ impl Object {
         (lo, hi)
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Two slabs, four cells apart, with cells between them that a few flying pixels hit.
+    #[test]
+    fn few_pixels_between_two_things_do_not_join_them() {
+        let mut pieces = Pieces::new(Lattice::new(Vec3::ZERO, Vec3::ONE, 20));
+        let size = pieces.lattice.size;
+        let at = |x: i32, y: i32, z: i32| ((z * size.y + y) * size.x + x) as usize;
+        for (y, z) in (4..16).flat_map(|y| (4..16).map(move |z| (y, z))) {
+            for x in [5, 6, 11, 12] {
+                pieces.counts[at(x, y, z)] = 40;
+            }
+        }
+        let between: Vec<usize> = (7..11).map(|x| at(x, 9, 9)).collect();
+        between.iter().for_each(|i| pieces.counts[*i] = PIXELS + 1);
+        assert_eq!(pieces.lattice.coords(at(11, 4, 5)), IVec3::new(11, 4, 5));
+        let (piece, count) = pieces.pieces();
+        assert_eq!(count, 2);
+        let (left, right) = (piece[at(5, 9, 9)], piece[at(12, 9, 9)]);
+        assert!(left > 0 && right > 0 && left != right);
+        // What hangs between goes with what it is next to.
+        let of: Vec<u32> = between.iter().map(|i| piece[*i]).collect();
+        assert_eq!(of, [left, left, right, right]);
+        // Many pixels do join: a bar is a bar.
+        between.iter().for_each(|i| pieces.counts[*i] = 40);
+        assert_eq!(pieces.pieces().1, 1);
+    }
+}

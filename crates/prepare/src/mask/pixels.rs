@@ -61,20 +61,25 @@ fn mask(view: &DepthView, object: &Object, supports: &[Plane], has: &(dyn Fn(Vec
         .map(|i| {
             let own = plain[i]?;
             let Some(Edge { front, back }) = Edge::at(view, i).filter(|_| !own) else { return Some(own) };
+            let x = place(view, &rot, trans, i)?;
+            // What lies on floor or wall does not fly.
+            if supports.iter().any(|p| p.holds(x, view.depth[i])) {
+                return Some(false);
+            }
             let (z, near, far) = (view.depth[i], view.depth[front], view.depth[back]);
             if z - near > far - z {
                 return Some(false);
             }
-            let x = place(view, &rot, trans, i)?;
             Some(plain[front] == Some(true) || in_front(object, supports, trans, x, z, NEARER * (far - z)))
         })
         .collect();
-    // Where nothing comes back in a large piece there is sky, or a room beyond reach.
+    // Where nothing comes back from far around, in a large piece, there is sky, or a room beyond reach.
     let mut void = vec![false; w * h];
     for blob in blobs(w * h, w, |i| known[i].is_none()).filter(|b| b.len() as f64 > VOID * (w * h) as f64) {
-        blob.into_iter().for_each(|i| void[i] = true);
+        let deep = blob.into_iter().filter(|i| around(*i, AROUND, w, h).all(|j| known[j].is_none()));
+        deep.for_each(|i| void[i] = true);
     }
-    // Where depth is missing, the neighbours decide; void beside an edge is half of a reason against it.
+    // Where depth is missing, the neighbours decide.
     let filled = |i: usize| {
         if let Some(own) = known[i] {
             return u8::from(own);
@@ -82,8 +87,8 @@ fn mask(view: &DepthView, object: &Object, supports: &[Plane], has: &(dyn Fn(Vec
         let (mut yes, mut no) = (0, 0);
         for j in around(i, AROUND, w, h) {
             match known[j] {
-                Some(true) => yes += 2,
-                Some(false) => no += 2,
+                Some(true) => yes += 1,
+                Some(false) => no += 1,
                 None => no += usize::from(void[j]),
             }
         }
@@ -194,5 +199,57 @@ pub(super) fn doubts(masks: &[Vec<Vec<u8>>], doubts: &mut Vec<String>) {
                 views.len()
             ));
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use hingecast_articulate::UNKNOWN;
+    use hingecast_articulate::observe::lattice::Lattice;
+    use hingecast_geom::{Camera, Pose};
+
+    const W: usize = 64;
+
+    /// A camera at the origin that looks along z; depth as given, 0 = nothing came back.
+    fn view(depth: Vec<f32>) -> DepthView {
+        let c = W as f64 / 2.0;
+        let camera =
+            Camera { width: W, height: W, fx: 80.0, fy: 80.0, cx: c, cy: c, camera_from_world: Pose::default() };
+        let class = depth.iter().map(|z| if *z > 0.0 { OBJECT } else { UNKNOWN }).collect();
+        DepthView { camera, depth, class }
+    }
+
+    /// All that is nearer than 1.2.
+    fn object() -> Object {
+        let lattice = Lattice::new(Vec3::new(-2.0, -2.0, 0.0), Vec3::new(2.0, 2.0, 3.0), 100);
+        let cells = (0..lattice.len()).map(|i| lattice.centre(lattice.coords(i)).z < 1.2).collect();
+        Object { lattice, cells }
+    }
+
+    /// Bars of one, two and six pixels, 1 away before a wall 2 away, every pixel the mean of those beside it.
+    #[test]
+    fn flying_pixels_go_with_what_they_are_nearer_to() {
+        let is_bar = |x: usize| x == 10 || (20..22).contains(&x) || (40..46).contains(&x);
+        let exact = |x: usize| if is_bar(x) { 1.0f32 } else { 2.0 };
+        let mixed = |x: usize| 0.25 * (exact(x.max(1) - 1) + 2.0 * exact(x) + exact((x + 1).min(W - 1)));
+        let flown = view((0..W * W).map(|i| mixed(i % W)).collect());
+        let found = mask(&flown, &object(), &[]);
+        let row: Vec<usize> = (0..W).filter(|x| found[30 * W + x] == 1).collect();
+        assert_eq!(row, (0..W).filter(|x| is_bar(*x)).collect::<Vec<_>>());
+    }
+
+    /// The object before the sky: its mask grows by a pixel at most, as many as an edge loses.
+    #[test]
+    fn sky_around_the_object_is_not_the_object() {
+        let before = |x: usize, y: usize| (20..40).contains(&x) && (20..40).contains(&y);
+        let sky = view((0..W * W).map(|i| if before(i % W, i / W) { 1.0 } else { 0.0 }).collect());
+        let found = mask(&sky, &object(), &[]);
+        let count: usize = found.iter().map(|m| usize::from(*m)).sum();
+        assert!((400..=22 * 22).contains(&count), "{count}");
+        // A hole in the object is filled.
+        let hole = |x: usize, y: usize| (25..28).contains(&x) && (25..28).contains(&y);
+        let holed = view((0..W * W).map(|i| if hole(i % W, i / W) { 0.0 } else { 1.0 }).collect());
+        assert!(mask(&holed, &object(), &[]).iter().all(|m| *m == 1));
     }
 }
