@@ -184,7 +184,7 @@ pub struct Import {
     #[arg(required = true, value_name = "SOURCE")]
     pub sources: Vec<PathBuf>,
     /// A film in which hands move the parts of what the only SOURCE, a scan, shows at rest; one camera,
-    /// any layout. It is cut into states: rests, and single pictures between them.
+    /// any layout. It is cut into states: rests, and single pictures between them [default: no film].
     #[arg(long, value_name = "PLAY")]
     pub film: Option<PathBuf>,
     /// States that a film is cut into at most, the scan among them.
@@ -211,7 +211,7 @@ pub struct Import {
     #[arg(long, default_value_t = import::Config::default().max_views, value_name = "N", value_parser = at_least_one)]
     pub max_views: usize,
     /// Folder of masks that are named as the colour images are, such as a segmenter writes. With several
-    /// sources once for each, in their order.
+    /// sources once for each, in their order [default: the source's own].
     #[arg(long, value_name = "FOLDER")]
     pub masks: Vec<PathBuf>,
     /// The object's number (or numbers: 1,3) in masks that have one a thing [default: all but 0].

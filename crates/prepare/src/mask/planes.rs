@@ -27,6 +27,11 @@ const EVERY: usize = 13;
 const NEAR: f32 = 2.5;
 const FEW: usize = 50;
 
+/// A thing lies on a plane if its top is at least so many tolerances of it before it, and not more than so
+/// many voxels.
+const LIFTED: f32 = 3.0;
+const THIN: f32 = 4.0;
+
 /// A flat surface: `normal . x = offset`.
 #[derive(Clone, Debug)]
 pub(crate) struct Plane {
@@ -48,6 +53,15 @@ impl Plane {
     /// The farthest from it that any of its pixels may be.
     pub fn widest(&self) -> f32 {
         self.at_distance.values().copied().fold(self.tolerance, f32::max)
+    }
+
+    /// Whether it is the flat top of a thing (scissors) that lies on another: along it, a little in front, and
+    /// by more than the other's own samples are off.
+    fn lies_on(&self, other: &Self, points: &[Vec3], voxel: f32) -> bool {
+        let mut heights: Vec<f32> = points.iter().map(|x| other.height(*x)).collect();
+        let middle = heights.len() / 2;
+        let gap = *heights.select_nth_unstable_by(middle, f32::total_cmp).1;
+        self.normal.dot(other.normal) > FACES && gap > LIFTED * other.tolerance && gap < THIN * voxel
     }
 
     /// Whether a place that was measured at `z` belongs to it: on it, or behind it.
@@ -81,7 +95,8 @@ pub(super) fn supports(room: &Room, up: Vec3, seed: u64) -> Vec<Plane> {
             break;
         }
         let points: Vec<Vec3> = members.iter().map(|&i| still[i].0).collect();
-        if is_support(&plane, &points, &moved, &all, up, voxel) {
+        let lies_on = |other: &Plane| plane.lies_on(other, &points, voxel);
+        if is_support(&plane, &points, &moved, &all, up, voxel) && !out.iter().any(lies_on) {
             out.push(plane);
         }
         let mut taken = members.into_iter().peekable();
@@ -201,4 +216,26 @@ fn spread(points: &[Vec3], along: Vec3) -> f32 {
     let last = at.len() - 1;
     let mut of = |share: f64| *at.select_nth_unstable_by((last as f64 * share) as usize, f32::total_cmp).1;
     of(0.99) - of(0.01)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn plane(offset: f32, tolerance: f32) -> Plane {
+        Plane { normal: Vec3::Z, offset, tolerance, at_distance: BTreeMap::new() }
+    }
+
+    /// Scissors on a floor were taken for another floor, and nothing was left of them.
+    #[test]
+    fn what_lies_on_the_floor_is_no_floor() {
+        let at = |z: f32| vec![Vec3::new(0.1, 0.2, z), Vec3::new(-0.3, 0.1, z), Vec3::new(0.4, 0.0, z)];
+        let top = plane(0.04, 0.02);
+        assert!(top.lies_on(&plane(0.0, 0.0075), &at(0.04), 0.025));
+        // A noisy floor's own upper samples are the floor's; a table is none of it.
+        assert!(!top.lies_on(&plane(0.0, 0.02), &at(0.04), 0.025));
+        assert!(!plane(0.7, 0.02).lies_on(&plane(0.0, 0.0075), &at(0.7), 0.025));
+        let wall = Plane { normal: Vec3::Y, ..plane(0.04, 0.02) };
+        assert!(!wall.lies_on(&plane(0.0, 0.0075), &at(0.04), 0.025));
+    }
 }
