@@ -99,7 +99,8 @@ struct Pair {
     own: f64,
 }
 
-fn mean(values: impl Iterator<Item = f64>) -> f64 {
+/// The mean of some values; 0 of none.
+pub(crate) fn mean(values: impl Iterator<Item = f64>) -> f64 {
     let (sum, n) = values.fold((0.0, 0usize), |(sum, n), x| (sum + x, n + 1));
     sum / n.max(1) as f64
 }

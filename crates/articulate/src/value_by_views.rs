@@ -11,9 +11,9 @@ use crate::observe::sample::Motion;
 use crate::observe::witness::{Witness, counted};
 use crate::passes::pass::{Round, label_by_verdicts, prune_parts, relabel};
 use crate::passes::refine_joints::refine_all;
-use crate::shown::{Shown, slack, some_points};
+use crate::shown::{Shown, mean, slack, some_points};
 use glam::Vec3;
-use hingecast_geom::{Joint, KinematicTree};
+use hingecast_geom::{Joint, KinematicTree, Pose};
 use rayon::prelude::*;
 
 /// Points of a part's surface that are asked about, over all states.
@@ -76,13 +76,14 @@ fn borne_out(
     let ((j, state), slack) = (at, slack(evidence));
     let joint = &tree.joints[j];
     let good: Vec<usize> = (0..joint.values.len()).filter(|s| *s != state && !said.contradicted.contains(s)).collect();
-    // As they lie with the joint at 0, in its parent's frame.
-    let points: Vec<Vec3> = good
+    let stood: Vec<(usize, Pose)> = good.iter().map(|&s| (s, tree.poses_at(s)[joint.child])).collect();
+    // As they lie with all joints at 0.
+    let points: Vec<Vec3> = stood
         .iter()
-        .flat_map(|&s| {
-            let parent = Motion::from(joint.screw.motion(0.0) * tree.poses_at(s)[joint.child].inverse());
-            let points = some_points(evidence, labels, s, joint.child, POINTS / good.len());
-            points.into_iter().map(move |x| parent.apply(x)).collect::<Vec<_>>()
+        .flat_map(|(s, pose)| {
+            let back = Motion::from(pose.inverse());
+            let points = some_points(evidence, labels, *s, joint.child, POINTS / good.len());
+            points.into_iter().map(move |x| back.apply(x))
         })
         .collect();
     let place = tree.poses_at(state)[joint.parent];
@@ -92,9 +93,10 @@ fn borne_out(
         let there = Motion::from(motion);
         let seen = mean(points.iter().map(|x| net(&witnesses[state], there.apply(*x), slack)));
         // The other way round: a lid that is put into its base is seen wherever the base is.
-        let explained = good.iter().map(|&s| {
-            let back = Motion::from(tree.poses_at(s)[joint.child] * motion.inverse());
-            mean(gone.iter().map(|x| net(&witnesses[s], back.apply(*x), slack)))
+        let from_here = motion.inverse();
+        let explained = stood.iter().map(|(s, pose)| {
+            let over = Motion::from(*pose * from_here);
+            mean(gone.iter().map(|x| net(&witnesses[*s], over.apply(*x), slack)))
         });
         seen + mean(explained)
     };
@@ -141,11 +143,6 @@ fn net(witnesses: &[Witness], x: Vec3, slack: f32) -> f64 {
         (0, 0) => 0.0,
         (through, on) => (on as f64 - through as f64) / (on + through) as f64,
     }
-}
-
-fn mean(values: impl Iterator<Item = f64>) -> f64 {
-    let (sum, n) = values.fold((0.0, 0usize), |(sum, n), x| (sum + x, n + 1));
-    sum / n.max(1) as f64
 }
 
 /// Drops parts that only the wrong value had made; what is known of the joints stays with them.

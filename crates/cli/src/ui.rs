@@ -79,8 +79,8 @@ impl Ui {
             let bar = ProgressBar::new(1).with_prefix(format!("{name:<7}"));
             let style = ProgressStyle::with_template("{prefix} [{bar:30}] {percent:>3} %  {elapsed} eta {eta}  {msg}");
             bar.set_style(style.expect("a fixed template").progress_chars("=> "));
+            let known = bar.style();
             let unknown = ProgressStyle::with_template("{prefix} {elapsed}  {msg}").expect("a fixed template");
-            let (known, unknown) = (bar.style(), unknown);
             let pace = Mutex::new((Pace::default(), Instant::now()));
             return Progress::new(
                 move |done, total, note| {

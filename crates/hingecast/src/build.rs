@@ -272,7 +272,8 @@ fn refuse_hopeless(recording: &Recording, method: Method) -> Result<()> {
     for state in 0..recording.n_states {
         let n = recording.frames_of(state, Split::Train).len();
         // The other states of a film are a picture or a few.
-        if n < if recording.film && state > 0 { 1 } else { 3 } {
+        let least = if recording.is_filmed(state) { 1 } else { 3 };
+        if n < least {
             let what = format!("state {state} has {n} usable training views");
             return Err(Failure::new(what, place, "record at least 3 (better 20) views of every state"));
         }

@@ -6,8 +6,10 @@
 //! looked through.
 
 use crate::error::PrepareError;
+use crate::mask::{around, unprojected, without_blobs};
 use crate::scan::extent;
-use glam::{Mat3, Vec3};
+use glam::Vec3;
+use hingecast_articulate::observe::sample::Motion;
 use hingecast_articulate::observe::witness::{Witness, counted};
 use hingecast_articulate::{DepthView, Depths, Labelled, OBJECT, OTHER};
 use hingecast_geom::{KinematicTree, Pose, Progress};
@@ -24,10 +26,10 @@ const AS_MANY: f64 = 0.25;
 /// Space around the object in which parts may have been hidden from the scan, shares of its longest side.
 const AROUND_OBJECT: f32 = 0.02;
 /// Pixels around one that decide with it, and the share of them that must say so.
-const AROUND: usize = 2;
+const AROUND: isize = 2;
 const AGREE: f64 = 0.5;
 /// Hands are widened by so many pixels: edges mix colours, and fingers lie close to what they hold.
-const WIDER: usize = 3;
+const WIDER: isize = 3;
 /// Blobs of fewer pixels are no hand.
 const SPECK: usize = 25;
 
@@ -105,16 +107,17 @@ fn of_view(view: &DepthView, back: &[Pose], witnesses: &[Witness], inside: (Vec3
     let (w, h) = (view.camera.width, view.camera.height);
     let world_from_camera = view.camera.camera_from_world.inverse();
     let (rot, trans) = (world_from_camera.mat3().as_mat3(), world_from_camera.trans.as_vec3());
-    let back: Vec<(Mat3, Vec3)> = back.iter().map(|p| (p.mat3().as_mat3(), p.trans.as_vec3())).collect();
-    let measured = |c: &u8| if *c == OTHER { OBJECT } else { *c };
-    let all = DepthView { class: view.class.iter().map(measured).collect(), ..view.clone() };
+    let back: Vec<Motion> = back.iter().map(|p| Motion::from(*p)).collect();
     // 1: a hand; 0: explained; 2: nothing is asked.
     let says: Vec<u8> = (0..w * h)
         .map(|i| {
             // Beyond the mask as well: an arm reaches farther than the object does.
-            let Some(x) = crate::mask::place(&all, &rot, trans, i) else { return 2 };
-            let explains = |(rot, trans): &(Mat3, Vec3)| {
-                let x = *rot * x + *trans;
+            if ![OBJECT, OTHER].contains(&view.class[i]) {
+                return 2;
+            }
+            let x = unprojected(view, &rot, trans, i);
+            let explains = |back: &Motion| {
+                let x = back.apply(x);
                 let (through, on) = counted(witnesses, x, 0.0);
                 // Out of the object's box nothing of it can have hidden.
                 let hidden = through < THROUGH && x.cmpge(inside.0).all() && x.cmple(inside.1).all();
@@ -125,38 +128,16 @@ fn of_view(view: &DepthView, back: &[Pose], witnesses: &[Witness], inside: (Vec3
             u8::from(!room && !back.iter().any(explains))
         })
         .collect();
-    let near = |k: usize, end: usize, reach: usize| k.saturating_sub(reach)..(k + reach + 1).min(end);
-    let agreed: Vec<bool> = (0..w * h)
-        .map(|i| {
-            if says[i] != 1 {
-                return false;
-            }
-            let (mut yes, mut asked) = (0u32, 0u32);
-            for y in near(i / w, h, AROUND) {
-                for x in near(i % w, w, AROUND) {
-                    let s = says[y * w + x];
-                    asked += u32::from(s < 2);
-                    yes += u32::from(s == 1);
-                }
-            }
-            f64::from(yes) >= AGREE * f64::from(asked)
-        })
-        .collect();
-    let blobs = without_specks(&agreed, w);
+    let agrees = |i: usize| {
+        let asked = around(i, AROUND, w, h).map(|j| says[j]).filter(|s| *s < 2);
+        let (yes, all) = asked.fold((0u32, 0u32), |(yes, all), s| (yes + u32::from(s == 1), all + 1));
+        f64::from(yes) >= AGREE * f64::from(all)
+    };
+    let mut agreed: Vec<u8> = (0..w * h).map(|i| u8::from(says[i] == 1 && agrees(i))).collect();
+    without_blobs(&mut agreed, w, 1, SPECK);
     let mut out = vec![0u8; w * h];
-    for i in (0..w * h).filter(|&i| blobs[i]) {
-        for y in near(i / w, h, WIDER) {
-            for x in near(i % w, w, WIDER) {
-                out[y * w + x] = 1;
-            }
-        }
+    for i in (0..w * h).filter(|&i| agreed[i] == 1) {
+        around(i, WIDER, w, h).for_each(|j| out[j] = 1);
     }
     out
-}
-
-/// Without connected blobs that are smaller than a speck.
-fn without_specks(mask: &[bool], w: usize) -> Vec<bool> {
-    let mut own: Vec<u8> = mask.iter().map(|m| u8::from(*m)).collect();
-    crate::mask::without_blobs(&mut own, w, 1, SPECK);
-    own.into_iter().map(|m| m == 1).collect()
 }

@@ -156,7 +156,7 @@ fn counts(recording: &Recording, out: &mut Vec<Finding>) {
         if usable == 0 && occluded > 0 {
             let hint = "record the state again without hands in the picture, or drop it";
             out.push(error("all-occluded", CaptureError::new("every frame of a state is occluded", place(s), hint)));
-        } else if usable < FEW_VIEWS && !(recording.film && s > 0) {
+        } else if usable < FEW_VIEWS && !recording.is_filmed(s) {
             let what = format!("a state has {usable} usable views; {FEW_VIEWS} or more see the object from all sides");
             let mut finding = warning("few-views", what, place(s), "record more views of it");
             if usable < TOO_FEW_VIEWS {

@@ -32,7 +32,7 @@ pub(super) struct Look {
     pub depth: Vec<f32>,
     pub object: Vec<u8>,
     /// Pixels of each number of a mask that has several, where nobody said which is the object.
-    labels: BTreeMap<u16, usize>,
+    labels: mask::Labels,
     hash: u128,
 }
 
@@ -141,7 +141,7 @@ impl Look {
             step,
             depth: (0..n).map(at).map(|i| if usable(i) { view.depth[i] } else { 0.0 }).collect(),
             object: (0..width * height).map(at).map(|i| view.mask[i] & view.usable[i]).collect(),
-            labels: BTreeMap::new(),
+            labels: mask::Labels::new(),
             hash,
         }
     }
@@ -176,8 +176,7 @@ fn masks(documents: &[Document], recording: &Recording, looks: &[Option<Look>], 
     if known.is_empty() {
         return;
     }
-    let mut numbers = BTreeMap::<u16, usize>::new();
-    known.iter().flat_map(|(_, l)| &l.labels).for_each(|(id, n)| *numbers.entry(*id).or_insert(0) += n);
+    let numbers = mask::sum(known.iter().map(|(_, l)| &l.labels));
     let chosen = known.iter().map(|(i, _)| &recording.frames[*i].mask_ids).find(|ids| !ids.is_empty());
     if numbers.len() > 1 {
         let place = recording.root.display().to_string();
@@ -193,8 +192,7 @@ fn masks(documents: &[Document], recording: &Recording, looks: &[Option<Look>], 
                 out.push(warning("mask-labels", what, place, hint));
             }
             Some(ids) if known.iter().all(|(_, l)| l.mask == 0.0) => {
-                let ids: Vec<String> = ids.iter().map(u16::to_string).collect();
-                let what = format!("no pixel of any mask is {}", ids.join(" or "));
+                let what = format!("no pixel of any mask is {}", mask::words(ids));
                 let hint = format!("the numbers of the masks are {}: correct mask_id", mask::listed(&numbers));
                 out.push(error("mask-labels", CaptureError::new(what, format!("{place}: mask_id"), hint)));
                 return;

@@ -50,7 +50,7 @@ pub(super) fn check(documents: &[Document], recording: &Recording, looks: &[Opti
 /// Cameras of a state that stand at one point give no depth.
 fn one_place(recording: &Recording, out: &mut Vec<Finding>) {
     // Who films a play may stand still.
-    for s in 0..if recording.film { 1 } else { recording.n_states } {
+    for s in (0..recording.n_states).filter(|s| !recording.is_filmed(*s)) {
         let centres: Vec<DVec3> =
             recording.frames_of(s, Split::Train).iter().map(|&i| recording.frames[i].camera.centre()).collect();
         let spread = centres.iter().map(|c| c.distance(centres[0])).fold(0.0, f64::max);

@@ -7,7 +7,8 @@
 use super::labels;
 use super::resize::{Size, area_average, majority, nearest, nearest_known, same_shape};
 use super::{MaskFrom, Shot, Source};
-use crate::recording::{images, mask};
+use crate::recording::images;
+use crate::recording::mask::{self, Labels};
 use crate::synth::Staging;
 use crate::{CaptureError, Frame, Recording, Split};
 use glam::DVec2;
@@ -86,7 +87,7 @@ struct Change {
     /// Pixels of the object, where there is a mask.
     object: Option<usize>,
     /// Pixels of each number, where the mask has several.
-    labels: BTreeMap<u16, usize>,
+    labels: Labels,
 }
 
 fn notes(changes: &[Change], min_confidence: u8) -> Vec<String> {
@@ -128,8 +129,7 @@ fn one(shot: &Shot, view: usize, root: &Path, min_confidence: u8) -> Result<(Fra
             "import the pictures of the size that the cameras were computed for",
         ));
     }
-    let mut change =
-        Change { color: size, depth: None, known: 0, unsure: 0, object: None, labels: labels::of(&shot.mask)? };
+    let mut change = Change { color: size, depth: None, known: 0, unsure: 0, object: None, labels: Labels::new() };
     let mut depth = None;
     if shot.depth.is_some() {
         let (values, depth_size) = depth_map(shot, min_confidence, &mut change)?;
@@ -149,13 +149,17 @@ fn one(shot: &Shot, view: usize, root: &Path, min_confidence: u8) -> Result<(Fra
     let rgba = image.into_rgba8().into_raw();
     let alpha = || rgba.chunks_exact(4).map(|p| if p[3] > 127 { 255 } else { 0 }).collect::<Vec<u8>>();
     let mask = match &shot.mask {
-        MaskFrom::File(path) => Some(mask_file(path, &shot.mask_ids, to)?),
+        MaskFrom::File(path) => {
+            let (mask, labels) = mask_file(path, &shot.mask_ids, to)?;
+            change.labels = labels;
+            Some(mask)
+        }
         MaskFrom::Any(paths) => Some(any_mask(paths, &shot.mask_ids, to)?),
         MaskFrom::Alpha if has_alpha => Some(majority(&alpha(), size, to)),
         MaskFrom::Alpha => None,
     };
     change.object = mask.as_ref().map(|m| m.iter().filter(|v| **v > 0).count());
-    let hidden = shot.occluder.as_ref().map(|path| mask_file(path, &[], to)).transpose()?;
+    let hidden = shot.occluder.as_ref().map(|path| mask_file(path, &[], to).map(|(mask, _)| mask)).transpose()?;
     let rgb: Vec<u8> = rgba.chunks_exact(4).flat_map(over_white).collect();
     let rgb = if to == size { rgb } else { area_average::<3>(&rgb, size, to) };
     let picture = Picture { rgb, mask, depth, hidden };
@@ -217,21 +221,22 @@ struct Picture {
 }
 
 /// 0 or 255 at the size wanted: by majority where it is larger, by the nearest pixel where it is
-/// smaller.
-fn mask_file(path: &Path, ids: &[u16], to: Size) -> Result<Vec<u8>, CaptureError> {
-    let (mask, w, h) = mask::read(path, ids)?;
+/// smaller. With the pixels of each number, where it has several.
+fn mask_file(path: &Path, ids: &[u16], to: Size) -> Result<(Vec<u8>, Labels), CaptureError> {
+    let (mask, w, h, labels) = mask::read_with_labels(path, ids)?;
     let from = (w, h);
-    if smaller(to, from) {
-        return Ok(majority(&mask, from, to));
-    }
-    Ok(nearest(from, to).map(|i| 255 * mask[i]).collect())
+    let mask = match smaller(to, from) {
+        true => majority(&mask, from, to),
+        false => nearest(from, to).map(|i| 255 * mask[i]).collect(),
+    };
+    Ok((mask, labels))
 }
 
 /// 255 where one of the files says so.
 fn any_mask(paths: &[PathBuf], ids: &[u16], to: Size) -> Result<Vec<u8>, CaptureError> {
     let mut all = vec![0; to.0 * to.1];
     for path in paths {
-        all.iter_mut().zip(mask_file(path, ids, to)?).for_each(|(a, m)| *a |= m);
+        all.iter_mut().zip(mask_file(path, ids, to)?.0).for_each(|(a, m)| *a |= m);
     }
     Ok(all)
 }

@@ -26,30 +26,62 @@ const LISTED: usize = 12;
 /// numbers.
 pub(crate) fn read(path: &Path, ids: &[u16]) -> Result<(Vec<u8>, usize, usize), CaptureError> {
     let (values, w, h) = numbers(path)?;
+    Ok((object(&values, path, ids)?, w, h))
+}
+
+/// The same, and what [`labels`] says.
+///
+/// # Errors
+/// As [`read`].
+pub(crate) fn read_with_labels(path: &Path, ids: &[u16]) -> Result<(Vec<u8>, usize, usize, Labels), CaptureError> {
+    let (values, w, h) = numbers(path)?;
+    Ok((object(&values, path, ids)?, w, h, counted(&values, path)))
+}
+
+fn object(values: &Numbers, path: &Path, ids: &[u16]) -> Result<Vec<u8>, CaptureError> {
     if !ids.is_empty() {
         let Numbers::Plain(values) = values else { return Err(colors(path, ids)) };
-        return Ok((values.into_iter().map(|v| u8::from(ids.contains(&v))).collect(), w, h));
+        return Ok(values.iter().map(|v| u8::from(ids.contains(v))).collect());
     }
     let (Numbers::Plain(values) | Numbers::Colors(values)) = values;
-    let half = threshold(&values, lossy(path));
-    Ok((values.into_iter().map(|v| u8::from(v > half)).collect(), w, h))
+    let half = threshold(values, lossy(path));
+    Ok(values.iter().map(|v| u8::from(*v > half)).collect())
 }
+
+/// Numbers of things in masks, and the pixels of each.
+pub(crate) type Labels = BTreeMap<u16, usize>;
 
 /// The labels other than 0 of a label image, with the pixels of each. Empty: its pixels are no labels, or
 /// one thing.
 ///
 /// # Errors
 /// When the image is missing or cannot be decoded.
-pub(crate) fn labels(path: &Path) -> Result<BTreeMap<u16, usize>, CaptureError> {
-    let Numbers::Plain(values) = numbers(path)?.0 else { return Ok(BTreeMap::new()) };
-    let mut count = BTreeMap::new();
+pub(crate) fn labels(path: &Path) -> Result<Labels, CaptureError> {
+    Ok(counted(&numbers(path)?.0, path))
+}
+
+fn counted(values: &Numbers, path: &Path) -> Labels {
+    let Numbers::Plain(values) = values else { return Labels::new() };
+    let mut count = Labels::new();
     values.iter().filter(|v| **v > 0).for_each(|v| *count.entry(*v).or_insert(0) += 1);
     let are_labels = !lossy(path) && count.len() > 1 && count.len() < FEW;
-    Ok(if are_labels { count } else { BTreeMap::new() })
+    if are_labels { count } else { Labels::new() }
+}
+
+/// The labels of many masks together.
+pub(crate) fn sum<'a>(all: impl Iterator<Item = &'a Labels>) -> Labels {
+    let mut out = Labels::new();
+    all.flatten().for_each(|(id, n)| *out.entry(*id).or_insert(0) += n);
+    out
+}
+
+/// `1 or 3`
+pub(crate) fn words(ids: &[u16]) -> String {
+    ids.iter().map(u16::to_string).collect::<Vec<_>>().join(" or ")
 }
 
 /// `1 (2041 pixels), 3 (88 pixels)`, of most pixels first.
-pub(crate) fn listed(labels: &BTreeMap<u16, usize>) -> String {
+pub(crate) fn listed(labels: &Labels) -> String {
     let mut all: Vec<(&u16, &usize)> = labels.iter().collect();
     all.sort_by_key(|(id, n)| (std::cmp::Reverse(**n), **id));
     let more = if all.len() > LISTED { ", ..." } else { "" };
@@ -63,9 +95,8 @@ fn lossy(path: &Path) -> bool {
 }
 
 fn colors(path: &Path, ids: &[u16]) -> CaptureError {
-    let ids: Vec<String> = ids.iter().map(u16::to_string).collect();
     CaptureError::new(
-        format!("a mask has colours, no numbers: none of its pixels is {}", ids.join(" or ")),
+        format!("a mask has colours, no numbers: none of its pixels is {}", words(ids)),
         path.display().to_string(),
         "export masks as grey or palette PNG with one number a thing, or leave --mask-id (mask_id) away",
     )

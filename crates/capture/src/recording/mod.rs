@@ -3,8 +3,8 @@
 //! Keys of ours, all optional but `state`: per frame `state` (integer), `view`, `time` (seconds),
 //! `occluded` (bool), `occluder_mask_path`; for the whole `name`, `metric` (lengths are metres),
 //! `up` (world direction, default z), `registered` (false: each state has a world frame of its own,
-//! default true), `film` (state 0 is a scan, the others are cut out of a film, default false). Instead of `state` a recording may have one
-//! `state_000/transforms.json` per state. Held-out frames are those that nerfstudio's
+//! default true), `film` (state 0 is a scan, the others are cut out of a film, default false).
+//! Instead of `state` a recording may have one `state_000/transforms.json` per state. Held-out frames are those that nerfstudio's
 //! `test_filenames` lists.
 
 mod cache;
@@ -156,6 +156,11 @@ impl Recording {
         let folder = || root.file_name().map(|n| n.to_string_lossy().into_owned()).unwrap_or("recording".into());
         let name = name.unwrap_or_else(folder);
         Self { root, name, frames, n_states, metric, up, registered, film }
+    }
+
+    /// Whether a state is cut out of a film: a picture or a few of one camera, hands in them.
+    pub fn is_filmed(&self, state: usize) -> bool {
+        self.film && state > 0
     }
 
     /// Indices of the usable frames of a state, in file order; wholly occluded frames are left out.

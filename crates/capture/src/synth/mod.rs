@@ -70,10 +70,12 @@ pub fn synth(
     let hands = config.play || config.occluders > 0.0;
     let folders =
         [("rgb", true), ("depth", true), ("mask", config.world.masks != Masks::None), ("occluder", hands && !film)];
-    for (capture, (folder, _)) in
-        captures(film).iter().flat_map(|c| folders.iter().filter(|f| f.1).map(move |f| (c, f)))
-    {
-        work.folder(&format!("{capture}{folder}"))?;
+    // Each capture has folders of its own.
+    let captures: &[&str] = if film { &[film::SCAN, film::PLAY] } else { &["."] };
+    for capture in captures {
+        for (folder, _) in folders.iter().filter(|(_, wanted)| *wanted) {
+            work.folder(&format!("{capture}/{folder}"))?;
+        }
     }
     if let Some(truth) = &truth_work {
         let own = ["labels", "parts"].into_iter().chain(film.then_some(output::HANDS));
@@ -155,11 +157,6 @@ pub fn synth(
         notes: still::notes(object, &states[..config.states], &shots),
         ranges: names.zip(ranges.iter().map(|r| [r.lower, r.upper])).collect(),
     })
-}
-
-/// What stands before the folders of pictures: of each capture, its own.
-fn captures(film: bool) -> &'static [&'static str] {
-    if film { &["scan/", "play/"] } else { &[""] }
 }
 
 /// What stays the same over all shots.

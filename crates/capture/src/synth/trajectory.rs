@@ -43,15 +43,12 @@ pub(super) fn stands(
     rng: &mut fastrand::Rng,
 ) -> Vec<Stand> {
     let plain = |direction: DVec3| Stand { direction, farther: 1.0, held: DVec3::ZERO };
-    let mut all: Vec<Stand> = match kind {
+    let all: Vec<Stand> = match kind {
         Trajectory::Hemisphere => cameras::directions(n, rng).into_iter().map(plain).collect(),
         Trajectory::Front => from_front(n, front, rng).into_iter().map(plain).collect(),
         Trajectory::Walk => walk(n, front, WALK[usize::from(site.is_some())], rng),
     };
-    if let Some(site) = site {
-        all.iter_mut().for_each(|s| s.direction = site.in_front(s.direction));
-    }
-    all
+    before_wall(all, site)
 }
 
 /// The unit vector at an azimuth about the vertical, counted from `front`, and the sine of an
@@ -72,42 +69,55 @@ fn from_front(n: usize, front: DVec3, rng: &mut fastrand::Rng) -> Vec<DVec3> {
     (0..n).map(place).collect()
 }
 
+/// How a person goes around the front.
+struct Way<'a> {
+    /// To either side of the front, degrees.
+    reach: f64,
+    /// Elevations, degrees.
+    heights: [f64; 2],
+    /// Swings up and down, and nearer and farther, on the way.
+    swings: [f64; 2],
+    /// Of the hand, about each axis, at a picture and its share of the way.
+    unsteady: &'a dyn Fn(usize, f64) -> [f64; 3],
+}
+
 /// From one side to the other, up and down, nearer and farther, with a hand that is not steady.
-fn walk(n: usize, front: DVec3, reach_deg: f64, rng: &mut fastrand::Rng) -> Vec<Stand> {
+fn arc(n: usize, front: DVec3, way: &Way, rng: &mut fastrand::Rng) -> Vec<Stand> {
     let leftwards = if rng.bool() { 1.0 } else { -1.0 };
     let [height, distance, pitch, yaw, roll] = [(); 5].map(|()| Sway::new(rng));
     let between = |[lo, hi]: [f64; 2], x: f64| lo + (hi - lo) * 0.5 * (1.0 + x);
     let stand = |i: usize| {
         let t = (i as f64 + 0.5) / n as f64;
-        let elevation = between(WALK_HEIGHTS, height.at(1.5 * t)).to_radians();
-        let held = DVec3::new(WOBBLE[0] * pitch.at(6.0 * t), WOBBLE[1] * yaw.at(6.0 * t), WOBBLE[2] * roll.at(3.0 * t));
+        let elevation = between(way.heights, height.at(way.swings[0] * t)).to_radians();
+        let [a, b, c] = (way.unsteady)(i, t);
+        let held = DVec3::new(WOBBLE[0] * pitch.at(a), WOBBLE[1] * yaw.at(b), WOBBLE[2] * roll.at(c));
         Stand {
-            direction: towards(front, leftwards * reach_deg.to_radians() * (2.0 * t - 1.0), elevation.sin()),
-            farther: between(WALK_DISTANCE, distance.at(2.0 * t)),
+            direction: towards(front, leftwards * way.reach.to_radians() * (2.0 * t - 1.0), elevation.sin()),
+            farther: between(WALK_DISTANCE, distance.at(way.swings[1] * t)),
             held: held * 1f64.to_radians(),
         }
     };
     (0..n).map(stand).collect()
 }
 
+fn walk(n: usize, front: DVec3, reach: f64, rng: &mut fastrand::Rng) -> Vec<Stand> {
+    let unsteady = |_: usize, t: f64| [6.0 * t, 6.0 * t, 3.0 * t];
+    arc(n, front, &Way { reach, heights: WALK_HEIGHTS, swings: [1.5, 2.0], unsteady: &unsteady }, rng)
+}
+
 /// From one side of the front slowly to the other, as somebody goes who films a play of `n` pictures.
 pub(super) fn look_on(n: usize, front: DVec3, site: Option<&Site>, rng: &mut fastrand::Rng) -> Vec<Stand> {
-    let leftwards = if rng.bool() { 1.0 } else { -1.0 };
-    let [height, distance, pitch, yaw, roll] = [(); 5].map(|()| Sway::new(rng));
-    let between = |[lo, hi]: [f64; 2], x: f64| lo + (hi - lo) * 0.5 * (1.0 + x);
-    let stand = |i: usize| {
-        let (t, swings) = ((i as f64 + 0.5) / n as f64, SWINGS * i as f64);
-        let elevation = between(LOOK_ON_HEIGHTS, height.at(t)).to_radians();
-        let held = DVec3::new(WOBBLE[0] * pitch.at(swings), WOBBLE[1] * yaw.at(swings), WOBBLE[2] * roll.at(swings));
-        let azimuth = leftwards * LOOK_ON.to_radians() * (2.0 * t - 1.0);
-        let direction = towards(front, azimuth, elevation.sin());
-        Stand {
-            direction: site.map_or(direction, |site| site.in_front(direction)),
-            farther: between(WALK_DISTANCE, distance.at(t)),
-            held: held * 1f64.to_radians(),
-        }
-    };
-    (0..n).map(stand).collect()
+    let unsteady = |i: usize, _: f64| [SWINGS * i as f64; 3];
+    let way = Way { reach: LOOK_ON, heights: LOOK_ON_HEIGHTS, swings: [1.0, 1.0], unsteady: &unsteady };
+    before_wall(arc(n, front, &way, rng), site)
+}
+
+/// All in front of a site's wall.
+fn before_wall(mut all: Vec<Stand>, site: Option<&Site>) -> Vec<Stand> {
+    if let Some(site) = site {
+        all.iter_mut().for_each(|s| s.direction = site.in_front(s.direction));
+    }
+    all
 }
 
 /// A smooth way to and fro between -1 and 1; about one swing as time goes by 1.

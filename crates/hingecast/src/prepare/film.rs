@@ -1,12 +1,11 @@
 //! A film of play: its pictures placed on the scan, cut into states; and the hands in it.
 
-use super::masks::mask_name;
+use super::masks::{Pixels, write_pixels};
 use super::raw_depths::RawDepths;
 use super::words::failure;
 use super::{put_cameras, register, settle};
 use crate::failure::{Failure, Result};
 use hingecast_articulate::{Config, Depths, find};
-use hingecast_capture::recording::images;
 use hingecast_capture::{Frame, Recording, Split};
 use hingecast_geom::{Pose, Progress};
 use hingecast_prepare::film::{Cut, Placing, cut, onto};
@@ -71,16 +70,11 @@ pub fn film(recording: &mut Recording, most: usize, seed: u64, progress: &Progre
             kept.push(Frame { state: state + 1, view, ..recording.frames[frame].clone() });
         }
     }
-    let gone: Vec<Frame> = recording
-        .frames
-        .iter()
-        .zip(&keeps)
-        .filter(|(f, kept)| f.state == 1 && !**kept)
-        .map(|(f, _)| f.clone())
-        .collect();
-    (recording.frames, recording.n_states) = (kept, 1 + cut.states.len());
+    let before = std::mem::replace(&mut recording.frames, kept);
+    recording.n_states = 1 + cut.states.len();
     recording.write()?;
-    for file in gone.iter().flat_map(|f| [Some(&f.color), f.depth.as_ref(), f.mask.as_ref()]).flatten() {
+    let gone = before.iter().zip(&keeps).filter(|(f, kept)| f.state == 1 && !**kept).map(|(f, _)| f);
+    for file in gone.flat_map(|f| [Some(&f.color), f.depth.as_ref(), f.mask.as_ref()]).flatten() {
         std::fs::remove_file(file).map_err(Failure::io(file))?;
     }
     Ok(Film { registration, placing, cut, pictures: n })
@@ -145,17 +139,13 @@ pub(super) fn find_hands(
     let mut depths = RawDepths::all_masked(recording);
     let found = find(&mut depths, &config, progress)?;
     let belief = Belief { tree: &found.tree, cameras: &found.cameras, samples: &found.samples };
-    let found = hands(&mut depths, &belief, progress).map_err(|e| failure(e, recording))?;
+    let mut found = hands(&mut depths, &belief, progress).map_err(|e| failure(e, recording))?;
     let used = found.share <= TOO_MANY;
     let report = HandReport { share: found.share, phantoms: found.phantoms, used };
-    for (state, masks) in found.masks.iter().enumerate().skip(1).filter(|_| used) {
-        for (frame, hand) in recording.frames_of(state, Split::Train).into_iter().zip(masks) {
-            let path = folder.join(hand_name(recording, frame));
-            let camera = &recording.frames[frame].camera;
-            let bytes: Vec<u8> = hand.iter().map(|m| 255 * m).collect();
-            images::write_gray(&path, &bytes, camera.width, camera.height)?;
-            recording.frames[frame].occluder_mask = Some(path);
-        }
+    if used {
+        // Of the scan there are none.
+        found.masks[0].clear();
+        write_pixels(recording, &found.masks, Pixels::Hand, folder)?;
     }
     Ok(report)
 }
@@ -178,9 +168,4 @@ pub(super) fn hands_doubt(found: &HandReport) -> Option<String> {
              hands are in the twin"
         )
     })
-}
-
-/// Of a frame's hands, in the folder of what was prepared.
-pub(super) fn hand_name(recording: &Recording, frame: usize) -> String {
-    format!("hand_{}", mask_name(recording, frame))
 }

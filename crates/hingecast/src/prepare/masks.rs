@@ -5,10 +5,10 @@ use super::words::failure;
 use crate::failure::{Failure, Result};
 use glam::DVec2;
 use hingecast_capture::recording::images;
-use hingecast_capture::{Recording, Split};
+use hingecast_capture::{Frame, Recording, Split};
 use hingecast_geom::Progress;
 use hingecast_prepare::{MaskReport, Wanted, object_masks};
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 /// Finds the object and writes its masks into `folder`, one PNG a training frame, named as the
 /// colour image is; frames point there.
@@ -25,17 +25,64 @@ pub fn find_masks(
     let mut depths = RawDepths::new(recording);
     let found = object_masks(&mut depths, wanted, recording.film, recording.up, seed, progress)
         .map_err(|e| failure(e, recording))?;
-    for (state, masks) in found.masks.iter().enumerate() {
+    write_pixels(recording, &found.masks, Pixels::Object, folder)?;
+    Ok(found.report)
+}
+
+/// What the pixels say that a build finds in a recording.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) enum Pixels {
+    /// They show the object.
+    Object,
+    /// They show a hand.
+    Hand,
+}
+
+impl Pixels {
+    /// The file of a frame's, in the folder of what was prepared.
+    fn name(self, recording: &Recording, frame: usize) -> String {
+        let mask = mask_name(recording, frame);
+        if self == Self::Hand { format!("hand_{mask}") } else { mask }
+    }
+
+    fn point(self, frame: &mut Frame, path: PathBuf) {
+        match self {
+            Self::Object => {
+                frame.mask = Some(path);
+                frame.mask_ids.clear();
+            }
+            Self::Hand => frame.occluder_mask = Some(path),
+        }
+    }
+}
+
+/// Writes `found` (1 = such a pixel; `[state][view]`, (h, w)) into `folder`; training frames point there.
+pub(super) fn write_pixels(
+    recording: &mut Recording,
+    found: &[Vec<Vec<u8>>],
+    pixels: Pixels,
+    folder: &Path,
+) -> Result<()> {
+    for (state, masks) in found.iter().enumerate() {
         for (frame, mask) in recording.frames_of(state, Split::Train).into_iter().zip(masks) {
-            let path = folder.join(mask_name(recording, frame));
+            let path = folder.join(pixels.name(recording, frame));
             let camera = &recording.frames[frame].camera;
             let bytes: Vec<u8> = mask.iter().map(|m| 255 * m).collect();
             images::write_gray(&path, &bytes, camera.width, camera.height)?;
-            recording.frames[frame].mask = Some(path);
-            recording.frames[frame].mask_ids.clear();
+            pixels.point(&mut recording.frames[frame], path);
         }
     }
-    Ok(found.report)
+    Ok(())
+}
+
+/// Lets training frames point to what [`write_pixels`] wrote into `folder`.
+pub(super) fn restore_pixels(recording: &mut Recording, pixels: Pixels, folder: &Path) {
+    for frame in 0..recording.frames.len() {
+        let path = folder.join(pixels.name(recording, frame));
+        if recording.frames[frame].split == Split::Train && path.is_file() {
+            pixels.point(&mut recording.frames[frame], path);
+        }
+    }
 }
 
 /// The place that a pixel of a picture shows, world frame. `picture`: the end of its path.
@@ -65,7 +112,7 @@ pub fn place_at(recording: &Recording, picture: &str, pixel: [f64; 2]) -> Result
 }
 
 /// `s003_v012.png`, which no two frames share.
-pub(super) fn mask_name(recording: &Recording, frame: usize) -> String {
+fn mask_name(recording: &Recording, frame: usize) -> String {
     let f = &recording.frames[frame];
     let before = recording.frames[..frame].iter().filter(|o| (o.state, o.view) == (f.state, f.view)).count();
     let more = if before > 0 { format!("_{before}") } else { String::new() };

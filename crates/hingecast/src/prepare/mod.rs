@@ -19,11 +19,11 @@ use hingecast_capture::{Recording, Split};
 use hingecast_geom::{Pose, Progress};
 use hingecast_prepare::register::Freedom;
 use hingecast_prepare::{MaskReport, PrepareError, Registration};
-use masks::mask_name;
+use masks::{Pixels, restore_pixels};
 use raw_depths::RawDepths;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use std::time::Instant;
 use words::failure;
 
@@ -266,21 +266,10 @@ fn restore(recording: &mut Recording, at: &Path) -> Result<Prepared> {
         recording.registered = true;
     }
     if prepared.masks.is_some() {
-        for frame in 0..recording.frames.len() {
-            let mask: PathBuf = at.join(mask_name(recording, frame));
-            if recording.frames[frame].split == Split::Train && mask.is_file() {
-                recording.frames[frame].mask = Some(mask);
-                recording.frames[frame].mask_ids.clear();
-            }
-        }
+        restore_pixels(recording, Pixels::Object, at);
     }
     if prepared.hands.is_some() {
-        for frame in 0..recording.frames.len() {
-            let hand: PathBuf = at.join(film::hand_name(recording, frame));
-            if recording.frames[frame].split == Split::Train && hand.is_file() {
-                recording.frames[frame].occluder_mask = Some(hand);
-            }
-        }
+        restore_pixels(recording, Pixels::Hand, at);
     }
     apply(recording, &prepared.pushes);
     Ok(prepared)

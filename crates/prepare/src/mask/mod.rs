@@ -10,7 +10,7 @@ mod pieces;
 mod pixels;
 mod planes;
 
-pub(crate) use pixels::without_blobs;
+pub(crate) use pixels::{around, without_blobs};
 
 use crate::error::PrepareError;
 use crate::scan::chosen;
@@ -84,8 +84,8 @@ pub(crate) struct Room {
 
 /// Finds the object in recordings without masks, by what a person says about it. `film`: state 0 is a
 /// scan, and the others are pictures of a film in which hands move the object; the object is what
-/// leaves where the scan saw it, and hands are in the film's masks. Pixels of class `OBJECT` are those with depth;
-/// cameras of all states are in one frame, in which `up` is up.
+/// leaves where the scan saw it, and hands are in the film's masks. Pixels of class `OBJECT` are those
+/// with depth; cameras of all states are in one frame, in which `up` is up.
 ///
 /// # Errors
 /// Nothing that moves where only that tells, nothing at the place that is named, cameras that look at nothing
@@ -198,13 +198,15 @@ fn inside(cloud: Cloud, lattice: &Lattice) -> Cloud {
     chosen(&cloud, &keep)
 }
 
-/// World position of pixel `i`, and of which cell; `None` without depth.
+/// World position of pixel `i`; `None` where it is not the object's or has no depth.
 pub(crate) fn place(view: &DepthView, rot: &glam::Mat3, trans: Vec3, i: usize) -> Option<Vec3> {
-    if view.class[i] != hingecast_articulate::OBJECT {
-        return None;
-    }
+    (view.class[i] == hingecast_articulate::OBJECT).then(|| unprojected(view, rot, trans, i))
+}
+
+/// World position of what pixel `i` measured; meaningless where it measured nothing.
+pub(crate) fn unprojected(view: &DepthView, rot: &glam::Mat3, trans: Vec3, i: usize) -> Vec3 {
     let (c, w) = (&view.camera, view.camera.width);
     let (u, v) = ((i % w) as f32 + 0.5, (i / w) as f32 + 0.5);
     let ray = Vec3::new((u - c.cx as f32) / c.fx as f32, (v - c.cy as f32) / c.fy as f32, 1.0);
-    Some(*rot * (ray * view.depth[i]) + trans)
+    *rot * (ray * view.depth[i]) + trans
 }

@@ -229,8 +229,8 @@ mod tests {
     #[test]
     fn few_pixels_between_two_things_do_not_join_them() {
         let mut pieces = Pieces::new(Lattice::new(Vec3::ZERO, Vec3::ONE, 20));
-        let size = pieces.lattice.size;
-        let at = |x: i32, y: i32, z: i32| ((z * size.y + y) * size.x + x) as usize;
+        let lattice = pieces.lattice;
+        let at = |x: i32, y: i32, z: i32| lattice.index_of(IVec3::new(x, y, z)).unwrap();
         for (y, z) in (4..16).flat_map(|y| (4..16).map(move |z| (y, z))) {
             for x in [5, 6, 11, 12] {
                 pieces.counts[at(x, y, z)] = 40;

@@ -129,7 +129,7 @@ impl Edge {
 }
 
 /// Pixels at most `reach` away along both axes, row by row.
-fn around(i: usize, reach: isize, w: usize, h: usize) -> impl Iterator<Item = usize> {
+pub(crate) fn around(i: usize, reach: isize, w: usize, h: usize) -> impl Iterator<Item = usize> {
     let (x, y) = ((i % w) as isize, (i / w) as isize);
     let rows = (y - reach).max(0)..=(y + reach).min(h as isize - 1);
     rows.flat_map(move |v| {
