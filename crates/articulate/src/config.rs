@@ -17,6 +17,10 @@ pub struct Config {
     pub borders: bool,
     /// In noisy recordings, fit the joints anew without a part of the views each, to know how sure they are.
     pub resample: bool,
+    /// State 0 is a scan of the thing alone, the others are pictures of a film in the order of time, and
+    /// what they show besides may be hands.
+    #[serde(skip)]
+    pub film: bool,
     /// Seed of everything random: the same seed, the same bytes.
     #[serde(skip)]
     pub seed: u64,
@@ -28,7 +32,16 @@ pub struct Config {
 
 impl Default for Config {
     fn default() -> Self {
-        Self { cells: 96, max_parts: 16, align_cameras: true, borders: true, resample: true, seed: 0, skip: Vec::new() }
+        Self {
+            cells: 96,
+            max_parts: 16,
+            align_cameras: true,
+            borders: true,
+            resample: true,
+            film: false,
+            seed: 0,
+            skip: Vec::new(),
+        }
     }
 }
 

@@ -92,6 +92,8 @@ pub struct Articulation {
 pub fn find(depths: &mut dyn Depths, config: &Config, progress: &Progress) -> Result<Articulation, ArticulateError> {
     let (n_states, seed) = (depths.n_states(), config.seed);
     let lattice = checked_lattice(depths, config)?;
+    let not = if config.film { NOT_OF_A_FILM } else { &[] };
+    let skip: Vec<String> = config.skip.iter().cloned().chain(not.iter().map(|s| s.to_string())).collect();
     let mut cameras: Vec<Vec<Pose>> = Vec::new();
     let mut evidence = Evidence::gather::<ArticulateError>(
         n_states,
@@ -108,10 +110,12 @@ pub fn find(depths: &mut dyn Depths, config: &Config, progress: &Progress) -> Re
         },
         seed,
     )?;
+    let of_film = |evidence: Evidence| if config.film { evidence.of_film(seed) } else { evidence };
+    evidence = of_film(evidence);
     let discovery = discover(&evidence, config.max_parts, seed, progress)?;
     let cost = discovery.cost;
     let (mut estimate, mut trace);
-    (evidence, estimate, trace) = settle(evidence, discovery, seed, &config.skip, progress)?;
+    (evidence, estimate, trace) = settle(evidence, discovery, seed, &skip, progress)?;
     correct(&estimate.world_from_state, &mut cameras);
     let mut labels = label_clouds(&evidence, &estimate.tree, &estimate.owners);
     let noisy = evidence.is_noisy();
@@ -131,9 +135,10 @@ pub fn find(depths: &mut dyn Depths, config: &Config, progress: &Progress) -> Re
             seed,
         )?;
         drop(before);
+        evidence = of_film(evidence);
         let again = Discovery::again(&evidence, estimate.tree, cost);
         let second;
-        (evidence, estimate, second) = settle(evidence, again, seed, &config.skip, progress)?;
+        (evidence, estimate, second) = settle(evidence, again, seed, &skip, progress)?;
         trace.extend(second);
         correct(&estimate.world_from_state, &mut cameras);
         labels = label_clouds(&evidence, &estimate.tree, &estimate.owners);
@@ -198,6 +203,10 @@ fn corrected(depths: &mut dyn Depths, state: usize, cameras: &[Pose]) -> Result<
     views.iter_mut().zip(cameras).for_each(|(view, pose)| view.camera.camera_from_world = *pose);
     Ok(views)
 }
+
+/// Passes that a picture of a film has too little for: it lies on the scan already, and shows too few
+/// samples to split parts by.
+const NOT_OF_A_FILM: &[&str] = &["align_states", "split_coupled"];
 
 /// Pixels across a view when it is asked whether parts move.
 const ACROSS: usize = 160;

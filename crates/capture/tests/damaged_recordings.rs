@@ -113,6 +113,12 @@ const CASES: &[Case] = &[
     ("transforms_json_is_an_image", "unreadable", Error, |d| {
         std::fs::copy(d.file(0, "file_path"), d.root().join("transforms.json")).map(|_| ()).unwrap()
     }),
+    ("film_not_cut", "uncut-film", Error, |d| {
+        d.json(|v| {
+            v["film"] = json!(true);
+            v["registered"] = json!(false);
+        })
+    }),
     ("frames_missing", "unreadable", Error, |d| d.json(|v| drop(v.as_object_mut().unwrap().remove("frames")))),
     ("frames_of_wrong_type", "unreadable", Error, |d| d.json(|v| v["frames"] = json!("many"))),
     ("frames_empty", "no-frames", Error, |d| d.json(|v| v["frames"] = json!([]))),

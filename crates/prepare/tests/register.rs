@@ -2,7 +2,7 @@
 
 mod common;
 
-use common::{block, cupboard, room, views};
+use common::{Block, block, chest, cupboard, room, views};
 use glam::{DQuat, DVec3};
 use hingecast_geom::{Pose, Progress};
 use hingecast_prepare::{PrepareError, register, register::Freedom, steady};
@@ -63,9 +63,9 @@ fn a_square_block_alone_is_ambiguous() {
     assert!(matches!(found, Err(PrepareError::Ambiguous { .. })), "{found:?}");
 }
 
-/// Views of the cupboard alone, masked: the room's depth stays, and frees what is before it.
-fn masked(door_deg: f64, push: Pose, seed: u64) -> Vec<hingecast_articulate::DepthView> {
-    let scene = [room(), cupboard(door_deg, push)].concat();
+/// Views of a thing alone, masked: the room's depth stays, and frees what is before it.
+fn masked(thing: Vec<Block>, seed: u64) -> Vec<hingecast_articulate::DepthView> {
+    let scene = [room(), thing].concat();
     let first = room().len() as u8 + 1;
     common::cameras(12, seed)
         .into_iter()
@@ -86,8 +86,9 @@ fn a_push_is_taken_out_and_a_door_is_not() {
     for (mm, deg) in [(0.0, 0.0), (5.0, 0.3), (30.0, 2.0), (60.0, 3.0)] {
         let push = Pose::new(DQuat::from_rotation_z(f64::to_radians(deg)), DVec3::new(0.6 * mm, -0.8 * mm, 0.0) * 1e-3);
         // Pushed in state 2, and left there.
-        let mut states: Vec<_> =
-            (0..5).map(|k| masked(25.0 * k as f64, if k < 2 { Pose::IDENTITY } else { push }, k as u64)).collect();
+        let mut states: Vec<_> = (0..5)
+            .map(|k| masked(cupboard(25.0 * k as f64, if k < 2 { Pose::IDENTITY } else { push }), k as u64))
+            .collect();
         let found = steady(&mut states, DVec3::Z, 0, &Progress::default()).unwrap();
         let middle = Pose::from_trans(DVec3::new(0.1, 0.75, 0.0));
         for (state, common_from_state) in found.iter().enumerate() {
@@ -99,4 +100,21 @@ fn a_push_is_taken_out_and_a_door_is_not() {
             assert!(mm > 0.0 || *common_from_state == Pose::IDENTITY, "nobody pushed: {common_from_state:?}");
         }
     }
+}
+
+/// A drawer that is nearly as far out as before lies well on itself: it is not the base for that.
+#[test]
+fn a_drawer_is_no_base() {
+    let push = Pose::new(DQuat::from_rotation_z(0.035), DVec3::new(0.018, -0.024, 0.0));
+    let mut states: Vec<_> = [0.0, 0.1, 0.2, 0.26, 0.34]
+        .into_iter()
+        .enumerate()
+        .map(|(k, out)| masked(chest(out, if k < 4 { Pose::IDENTITY } else { push }), k as u64))
+        .collect();
+    let found = steady(&mut states, DVec3::Z, 0, &Progress::default()).unwrap();
+    assert!(found[..4].iter().all(|p| *p == Pose::IDENTITY), "nobody pushed: {found:?}");
+    let middle = Pose::from_trans(DVec3::new(0.1, 0.75, 0.0));
+    let off = found[4] * middle * push * middle.inverse();
+    let shift = (off.apply(middle.trans) - middle.trans).length();
+    assert!(off.angle().to_degrees() < 0.05 && shift < 0.001, "{} deg, {shift} m", off.angle().to_degrees());
 }

@@ -2,6 +2,8 @@
 //! the rival type of a joint.
 
 pub mod gauss_newton;
+pub mod path;
 pub mod rival;
+mod sweep_film;
 pub mod sweep_values;
 pub mod unknowns;

@@ -1,5 +1,6 @@
 //! One screw against all states: at which value does each state agree with it, and how well.
 
+use super::sweep_film::sweep_film;
 use crate::model::motions::in_parent_frame;
 use crate::observe::evidence::Evidence;
 use crate::observe::occupancy::Answer;
@@ -74,6 +75,9 @@ pub fn sweep_values(
     };
     let count = (((range[1] - range[0]) * reach / step as f64).ceil() as usize).clamp(1, 1500);
     let grid: Vec<f64> = (0..=count).map(|k| range[0] + (range[1] - range[0]) * k as f64 / count as f64).collect();
+    if question.evidence.film {
+        return sweep_film(question, samples, parent_poses, screw, &grid, reach);
+    }
     // Turns about one axis share its frame; composing with the parent is one product a state.
     let (mut values, mut scores) = (Vec::new(), Vec::new());
     for (state, place) in parent_poses.iter().enumerate() {
@@ -98,7 +102,7 @@ pub fn grid_agreement(question: &Question, state: usize, samples: &[Sample], m: 
 }
 
 /// The agreement, or little once it is sure to stay below `floor`.
-fn agreement_above(question: &Question, state: usize, samples: &[Sample], m: &Motion, floor: f32) -> f32 {
+pub(super) fn agreement_above(question: &Question, state: usize, samples: &[Sample], m: &Motion, floor: f32) -> f32 {
     let n = samples.len() as f32;
     let space = &question.evidence.spaces[state];
     let mut sum = 0.0;
@@ -136,6 +140,10 @@ pub fn improved_values(
     let samples = in_parent_frame(joint, members, parent_poses);
     let question = Question { evidence, claims, worth: Worth::SOUGHT };
     let mut found = sweep_joint(&question, joint, &samples, parent_poses);
+    if evidence.film {
+        let zero = found.values[0];
+        return found.values.iter().map(|v| v - zero).collect();
+    }
     for (s, parent) in parent_poses.iter().enumerate() {
         let held = Motion::from(*parent * joint.screw.motion(joint.values[s]));
         if found.scores[s] < grid_agreement(&question, s, &samples, &held) + CLEARLY_BETTER {

@@ -16,6 +16,8 @@ pub const MOST_STATES: usize = 64;
 /// Samples that labels are decided on: in all, and at most per state.
 const SAMPLES: usize = 62_500;
 const PER_STATE: usize = 8000;
+/// And of the scan before a film.
+const OF_SCAN: usize = 16_000;
 /// Neighbours that must mostly agree before a contradiction counts.
 const NEIGHBOURS: usize = 8;
 
@@ -39,6 +41,9 @@ pub struct Evidence {
     pub samples: Vec<Sample>,
     /// Nearest samples of the same state. `[sample][NEIGHBOURS]`
     pub neighbours: Vec<Vec<u32>>,
+    /// State 0 is a scan of the thing alone, the others are pictures of a film in the order of time; what
+    /// they show besides may be hands.
+    pub film: bool,
     /// Distance to the plane within which two measurements are the same surface, scene units.
     pub tolerance: f32,
 }
@@ -52,32 +57,48 @@ impl Evidence {
         states: &mut dyn FnMut(usize) -> Result<Vec<DepthView>, E>,
         seed: u64,
     ) -> Result<Self, E> {
-        let (mut clouds, mut spaces, mut samples) = (Vec::new(), Vec::new(), Vec::new());
-        let mut neighbours = Vec::new();
-        let mut rng = fastrand::Rng::with_seed(seed ^ 0x5a3b);
+        let (mut clouds, mut spaces) = (Vec::new(), Vec::new());
         for state in 0..n_states {
             let views = states(state)?;
             let least = if views.len() >= 8 { 2 } else { 1 };
             let cloud = gather(&views, lattice.voxel, 1, least);
             spaces.push(Occupancy::new(lattice, &cloud, &views, 1.5));
+            clouds.push(Surface::new(cloud.points, cloud.normals));
+        }
+        let (samples, neighbours, tolerance) = (Vec::new(), Vec::new(), 0.2 * lattice.voxel);
+        let mut evidence = Self { lattice, clouds, spaces, samples, neighbours, film: false, tolerance };
+        evidence.draw(seed);
+        evidence.tolerance = evidence.tolerance.max(4.0 * evidence.noise());
+        Ok(evidence)
+    }
+
+    /// The same as a scan and a film: with many more samples of the scan.
+    pub fn of_film(mut self, seed: u64) -> Self {
+        self.film = true;
+        self.draw(seed);
+        self
+    }
+
+    /// Draws the samples anew.
+    fn draw(&mut self, seed: u64) {
+        let mut rng = fastrand::Rng::with_seed(seed ^ 0x5a3b);
+        self.samples.clear();
+        self.neighbours.clear();
+        let most = (SAMPLES / self.n_states()).min(PER_STATE);
+        for (state, cloud) in self.clouds.iter().enumerate() {
             let mut order: Vec<usize> = (0..cloud.points.len()).collect();
             rng.shuffle(&mut order);
-            order.truncate((SAMPLES / n_states).min(PER_STATE));
+            order.truncate(if self.film && state == 0 { OF_SCAN } else { most });
             order.sort_unstable();
-            let first = samples.len() as u32;
+            let first = self.samples.len() as u32;
             let points: Vec<Vec3> = order.iter().map(|&i| cloud.points[i]).collect();
             let tree = PointTree::new(&points);
-            neighbours.par_extend(points.par_iter().map(|x| {
+            self.neighbours.par_extend(points.par_iter().map(|x| {
                 let near = tree.k_nearest(*x, NEIGHBOURS + 1);
                 near.into_iter().skip(1).map(|j| first + j).collect::<Vec<u32>>()
             }));
-            let cloud = Surface::new(cloud.points, cloud.normals);
-            samples.extend(order.iter().map(|&i| Sample::of(&cloud, state, i)));
-            clouds.push(cloud);
+            self.samples.extend(order.iter().map(|&i| Sample::of(cloud, state, i)));
         }
-        let mut evidence = Self { lattice, clouds, spaces, samples, neighbours, tolerance: 0.2 * lattice.voxel };
-        evidence.tolerance = evidence.tolerance.max(4.0 * evidence.noise());
-        Ok(evidence)
     }
 
     /// Longest side of the space that the object takes in all states, scene units.

@@ -1,7 +1,7 @@
 //! How much of what is unexplained would a new part explain?
 
 use super::claims::{Claims, POSSIBLE};
-use super::verdict::{Verdict, contradictions};
+use super::verdict::{Verdict, contradictions_of_best};
 use crate::model::motions::state_to_state;
 use crate::observe::evidence::Evidence;
 use crate::observe::occupancy::Answer;
@@ -11,10 +11,26 @@ use rayon::prelude::*;
 
 /// Open samples that judge candidates, all states together.
 pub struct Consensus {
-    /// Sample, and the fewest contradictions under a known part.
-    members: Vec<(Sample, f64)>,
+    /// One jury; of a film two, the scan's and the others'.
+    juries: Vec<Jury>,
+}
+
+/// Open samples that count alike.
+struct Jury {
+    members: Vec<Member>,
     /// Open samples per member.
     weight: f64,
+    /// Contradictions that all samples of its states have if nothing moves.
+    all: f64,
+}
+
+/// An open sample.
+struct Member {
+    sample: Sample,
+    /// Contradictions under the known part with the fewest of them.
+    fewest: f64,
+    /// The states that they are of.
+    against: u64,
 }
 
 /// What the states say about a sample, one bit each.
@@ -54,6 +70,8 @@ const MET_LOOSELY: f64 = 0.3;
 const UNSEEN_SHARE: f64 = 0.1;
 /// What it counts if the surface met could as well belong to a known part.
 const POSSIBLE_SHARE: f64 = 0.8;
+/// Of the contradictions that a scan has if nothing moves, a part removes at least this share.
+const LEAST_OF_SCAN: f64 = 0.03;
 /// States in which a sample's distance to the surface is measured.
 const MEASURED_STATES: usize = 4;
 
@@ -61,22 +79,57 @@ impl Consensus {
     /// `open`: samples that every known part contradicts; `verdicts`: of the known parts
     /// `[part][sample]`.
     pub fn new(evidence: &Evidence, open: &[usize], verdicts: &[Vec<Verdict>], seed: u64) -> Self {
-        let mut chosen = open.to_vec();
-        fastrand::Rng::with_seed(seed).shuffle(&mut chosen);
-        chosen.truncate(MOST_MEMBERS);
-        chosen.sort_unstable();
-        let weight = open.len() as f64 / chosen.len().max(1) as f64;
-        Self {
-            members: chosen.into_iter().map(|i| (evidence.samples[i], contradictions(verdicts, i))).collect(),
-            weight,
+        let of_scan = |i: &usize| evidence.samples[*i].state == 0;
+        if !evidence.film {
+            return Self { juries: vec![Jury::new(evidence, open.to_vec(), 0.0, verdicts, seed)] };
         }
+        let all = |scan: bool| -> f64 {
+            let own = (0..evidence.samples.len()).filter(|i| of_scan(i) == scan);
+            own.map(|i| verdicts[0][i].against.count_ones() as f64).sum()
+        };
+        let jury = |scan: bool| {
+            let own = open.iter().copied().filter(|i| of_scan(i) == scan);
+            Jury::new(evidence, own.collect(), all(scan), verdicts, seed)
+        };
+        Self { juries: vec![jury(true), jury(false)] }
     }
 
     /// Contradictions that a part with these poses (world from canonical) removes. With `tight`,
     /// surface only counts whole where it is met within the noise, and is not explained already.
+    ///
+    /// Of a film, a part must be seen in it as well as in the other states: the harmonic mean
+    /// of what it removes of the scan's and of the others', so that hands, of which the scan has nothing,
+    /// are no part.
     pub fn gain(&self, evidence: &Evidence, claims: &Claims, poses: &[Pose], tight: bool) -> f64 {
         let between = state_to_state(poses);
-        let each = |(s, fewest): &(Sample, f64)| {
+        let removed = |jury: &Jury| jury.gain(evidence, claims, &between, tight);
+        let [scan, others] = &self.juries[..] else { return removed(&self.juries[0]) };
+        let share = |jury: &Jury| removed(jury) / jury.all.max(1.0);
+        let (of_scan, of_others) = (share(scan), share(others));
+        if of_scan < LEAST_OF_SCAN {
+            return 0.0;
+        }
+        (scan.all + others.all) * 2.0 * of_scan * of_others / (of_scan + of_others)
+    }
+}
+
+impl Jury {
+    fn new(evidence: &Evidence, open: Vec<usize>, all: f64, verdicts: &[Vec<Verdict>], seed: u64) -> Self {
+        let n = open.len();
+        let mut chosen = open;
+        fastrand::Rng::with_seed(seed).shuffle(&mut chosen);
+        chosen.truncate(MOST_MEMBERS);
+        chosen.sort_unstable();
+        let weight = n as f64 / chosen.len().max(1) as f64;
+        let member = |i: usize| {
+            let (fewest, part) = contradictions_of_best(verdicts, i);
+            Member { sample: evidence.samples[i], fewest, against: verdicts[part][i].against }
+        };
+        Self { members: chosen.into_iter().map(member).collect(), weight, all }
+    }
+
+    fn gain(&self, evidence: &Evidence, claims: &Claims, between: &[Vec<Motion>], tight: bool) -> f64 {
+        let each = |Member { sample: s, fewest, against }: &Member| {
             let v = Met::new(evidence, claims, s, &between[s.state]);
             let removed = (fewest - v.against.count_ones() as f64).max(0.0);
             // A motion that is nearly right everywhere is wrong: what remains weighs on what is
@@ -87,6 +140,11 @@ impl Consensus {
                 (0, possible) => (POSSIBLE_SHARE, possible),
                 (fresh, _) => (1.0, fresh),
             };
+            // A picture of a film shows little of a thing, and any place that it does not show would do.
+            let removed = match evidence.film {
+                true => removed * seen(against & !v.against, v.fresh | v.possible),
+                false => removed,
+            };
             if removed == 0.0 || !tight {
                 return removed * share;
             }
@@ -95,6 +153,12 @@ impl Consensus {
         // Summed in a fixed order.
         self.members.par_iter().map(each).collect::<Vec<f64>>().iter().sum::<f64>() * self.weight
     }
+}
+
+/// What the states whose contradictions were removed say: 1 where they show the sample.
+fn seen(removed: u64, met: u64) -> f64 {
+    let share = (met & removed).count_ones() as f64 / removed.count_ones().max(1) as f64;
+    UNSEEN_SHARE + (1.0 - UNSEEN_SHARE) * share
 }
 
 /// Share of some supporting states in which the sample meets the surface within the noise.

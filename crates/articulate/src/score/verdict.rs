@@ -31,13 +31,18 @@ const UNSEEN_LEFT: f64 = 0.3;
 /// Fewest contradictions of sample `i` under any of the parts in `verdicts`, of which the first is
 /// the base.
 pub fn contradictions(verdicts: &[impl AsRef<[Verdict]>], i: usize) -> f64 {
+    contradictions_of_best(verdicts, i).0
+}
+
+/// The same, with the part that has fewest.
+pub fn contradictions_of_best(verdicts: &[impl AsRef<[Verdict]>], i: usize) -> (f64, usize) {
     let still = verdicts[0].as_ref()[i].against.count_ones() as f64;
-    let moved = verdicts[1..].iter().map(|part| {
-        let v = part.as_ref()[i];
+    let moved = verdicts.iter().enumerate().skip(1).map(|(part, verdicts)| {
+        let v = verdicts.as_ref()[i];
         let left = if v.support == 0 { UNSEEN_LEFT * still } else { 0.0 };
-        left.max(v.against.count_ones() as f64)
+        (left.max(v.against.count_ones() as f64), part)
     });
-    moved.fold(still, f64::min)
+    moved.fold((still, 0), |best, other| if other.0 < best.0 { other } else { best })
 }
 
 impl Evidence {

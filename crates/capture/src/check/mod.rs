@@ -135,6 +135,7 @@ pub fn check(path: &Path, progress: &Progress) -> Result<CheckReport, CaptureErr
     };
     let mut problems = Vec::new();
     let recording = Recording::from_documents(&documents, &mut problems);
+    findings.extend(recording.uncut().map(|e| error("uncut-film", e)));
     description::check(&documents, &recording, problems, &mut findings);
     let looks = pixels::check(&documents, &recording, progress, &mut findings)?;
     space::check(&documents, &recording, &looks, &mut findings);

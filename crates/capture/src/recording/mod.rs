@@ -109,6 +109,15 @@ impl Recording {
     /// # Errors
     /// The first thing that makes the recording unusable; `check` lists all of them.
     pub fn open(path: &Path) -> Result<Self, CaptureError> {
+        let recording = Self::open_uncut(path)?;
+        recording.uncut().map_or(Ok(recording), Err)
+    }
+
+    /// The same, of a film also between its import and its being cut into states.
+    ///
+    /// # Errors
+    /// As [`Recording::open`].
+    pub fn open_uncut(path: &Path) -> Result<Self, CaptureError> {
         let documents = transforms::read(path)?;
         let mut problems = Vec::new();
         let recording = Self::from_documents(&documents, &mut problems);
@@ -116,6 +125,18 @@ impl Recording {
             Some(problem) => Err(problem.error),
             None => Ok(recording),
         }
+    }
+
+    /// What is wrong with a film whose import was stopped before it was cut: all of it is one state.
+    pub(crate) fn uncut(&self) -> Option<CaptureError> {
+        (self.film && !self.registered).then(|| {
+            let what = "a film that is not cut into states yet: its import was stopped";
+            CaptureError::new(
+                what,
+                self.root.display().to_string(),
+                "import it again: hingecast import SCAN --film PLAY -o REC",
+            )
+        })
     }
 
     /// What can be made of the documents; everything that is wrong goes to `problems`, frames with

@@ -27,7 +27,7 @@ pub fn run(session: &Session, args: &Import) -> Result<Outcome> {
         report.states,
         report.recording.display()
     ));
-    let mut recording = Recording::open(&report.recording)?;
+    let mut recording = Recording::open_uncut(&report.recording)?;
     let (mut registration, mut states) = (None, report.states);
     if recording.film {
         let film = prepare::film(&mut recording, args.film_states, 0, &session.ui.stage("film"))?;

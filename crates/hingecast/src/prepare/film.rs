@@ -133,6 +133,7 @@ pub(super) fn find_hands(
         align_cameras: false,
         borders: false,
         resample: false,
+        film: true,
         seed,
         skip: SKIPPED.map(String::from).to_vec(),
     };

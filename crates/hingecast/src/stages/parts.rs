@@ -55,6 +55,7 @@ pub fn run(inputs: &Inputs, progress: &Progress) -> Result<(Parts, Vec<Labelled>
     let extent = (lo.as_vec3(), hi.as_vec3());
     let mut depths = RecordedDepths { inputs, frames: inputs.training_frames(), extent };
     let mut config = inputs.config.screw.clone();
+    config.film = inputs.recording.film;
     (config.seed, config.skip) = (inputs.config.seed, inputs.config.passes.skip.clone());
     let found = find(&mut depths, &config, progress)?;
     Ok((Parts::new(&found, &depths.frames, extent), found.samples, found.trace))

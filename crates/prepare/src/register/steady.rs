@@ -14,6 +14,7 @@ use crate::error::PrepareError;
 use crate::scan::Scan;
 use glam::{DVec3, Vec3};
 use hingecast_articulate::Depths;
+use hingecast_articulate::observe::occupancy::Answer;
 use hingecast_geom::icp::Surface;
 use hingecast_geom::{Pose, Progress};
 
@@ -36,7 +37,7 @@ const EARNED_FINELY: f64 = 1.15;
 /// share may stand where it stood. Drawers pulled out together look like a cupboard that was pushed,
 /// but its frame has stayed.
 const CLEARLY: f64 = 2.5;
-const STANDS: f64 = 0.1;
+const STANDS: f64 = 0.05;
 /// Within so many fine voxels of a plane, or three times the noise, a sample lies on it.
 const ON: f32 = 0.25;
 /// Places that are settled finely, and the rounds of that.
@@ -135,12 +136,22 @@ fn placed(scan: &Scan, before: &[(&Scan, Pose)], candidates: &[Pose], up: DVec3,
     let surface = Surface::new(points, normals);
     let voxel = scan.fine_voxel;
     let (even, facing) = (balanced::evenly(&scan.fine, SAMPLES), balanced::pick(&scan.fine, SAMPLES, seed));
+    let back: Vec<(&Scan, Pose)> = before.iter().map(|(other, pose)| (*other, pose.inverse())).collect();
     let on = |pose: &Pose, within: f32| -> Vec<bool> {
         let (moved, turned) = fine::carried(&even, pose);
+        // A drawer lies on itself in a state that had it as far out; others looked through there.
+        let empty = |x: Vec3, m: Vec3| {
+            let through = |(other, back): &(&Scan, Pose)| {
+                let at = back.apply(x.as_dvec3()).as_vec3();
+                other.ask(at, back.rotate(m.as_dvec3()).as_vec3()) == Answer::Free
+            };
+            back.iter().any(through)
+        };
         let lies = |(x, m): (&Vec3, &Vec3)| {
             let Some((j, squared)) = surface.nearest(*x) else { return false };
             let n = surface.normals[j];
-            squared < (2.0 * voxel).powi(2) && m.dot(n) > 0.9 && n.dot(*x - surface.points[j]).abs() < within
+            let off = n.dot(*x - surface.points[j]).abs();
+            squared < (2.0 * voxel).powi(2) && m.dot(n) > 0.9 && off < within && !empty(*x, *m)
         };
         moved.iter().zip(&turned).map(lies).collect()
     };

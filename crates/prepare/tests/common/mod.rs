@@ -57,6 +57,29 @@ pub fn cupboard(door_deg: f64, push: Pose) -> Vec<Block> {
     all.map(|b| Block { world_from_block: moved * b.world_from_block, ..b }).collect()
 }
 
+/// A case of 0.7 x 0.4 x 0.6 m before the wall, its walls 6 cm thick, with one drawer as deep as it, pulled
+/// out by `out` m; the whole of it moved by `push` (about its own middle).
+pub fn chest(out: f64, push: Pose) -> Vec<Block> {
+    let middle = DVec3::new(0.1, 0.75, 0.0);
+    let moved = Pose::from_trans(middle) * push * Pose::from_trans(-middle);
+    let case = [
+        block([0.1, 0.94, 0.3], [0.7, 0.02, 0.6], 0.0),
+        block([-0.22, 0.75, 0.3], [0.06, 0.4, 0.6], 0.0),
+        block([0.42, 0.75, 0.3], [0.06, 0.4, 0.6], 0.0),
+        block([0.1, 0.75, 0.57], [0.7, 0.4, 0.06], 0.0),
+        block([0.1, 0.75, 0.03], [0.7, 0.4, 0.06], 0.0),
+    ];
+    let drawer = [
+        block([0.1, 0.54 - out, 0.3], [0.58, 0.02, 0.48], 0.0),
+        block([-0.17, 0.73 - out, 0.28], [0.02, 0.36, 0.36], 0.0),
+        block([0.37, 0.73 - out, 0.28], [0.02, 0.36, 0.36], 0.0),
+        block([0.1, 0.73 - out, 0.1], [0.52, 0.36, 0.02], 0.0),
+        block([0.1, 0.91 - out, 0.28], [0.52, 0.02, 0.36], 0.0),
+        block([0.1, 0.51 - out, 0.3], [0.12, 0.04, 0.03], 0.0),
+    ];
+    case.into_iter().chain(drawer).map(|b| Block { world_from_block: moved * b.world_from_block, ..b }).collect()
+}
+
 /// What a camera sees: z, 0 where nothing is; and which block, from 1.
 pub fn picture(camera: &Camera, blocks: &[Block]) -> (Vec<f32>, Vec<u8>) {
     let (w, h) = (camera.width, camera.height);
