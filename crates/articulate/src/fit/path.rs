@@ -62,7 +62,7 @@ mod tests {
     fn a_path_is_the_best_of_all() {
         // Against trying every path.
         let mut rng = fastrand::Rng::with_seed(3);
-        let (states, steps) = (4, 6);
+        let (states, steps) = (4usize, 6usize);
         for _ in 0..50 {
             let scores: Vec<Vec<f32>> = (0..states).map(|_| (0..steps).map(|_| rng.f32()).collect()).collect();
             let cost = 0.3 * rng.f64();
