@@ -289,6 +289,18 @@ fn a_healthy_recording_has_no_findings() {
     assert!(report.findings.is_empty(), "{}", said(&report));
     assert_eq!(report.states.len(), 3);
     assert_eq!((report.states[0].usable, report.states[0].test), (14, 1));
+    let least = report.shared.iter().flatten().copied().fold(1.0, f64::min);
+    assert!(report.shared.len() == 3 && least > 0.3, "{:?}", report.shared);
+}
+
+#[test]
+fn a_state_that_lies_elsewhere_shares_little_with_any() {
+    let d = Damaged::new();
+    let (_, _, _, damage) = CASES.iter().find(|c| c.0 == "a_state_lies_elsewhere").unwrap();
+    damage(&d);
+    let shared = check(&d.root(), &Default::default()).unwrap().shared;
+    let (apart, together) = (shared[2][0].max(shared[2][1]), shared[0][1].min(shared[1][0]));
+    assert!(apart < 0.5 * together, "{shared:?}");
 }
 
 #[test]

@@ -79,6 +79,10 @@ pub struct CheckReport {
     pub findings: Vec<Finding>,
     /// One entry a state, in order; empty when the recording cannot be read.
     pub states: Vec<StateFrames>,
+    /// Share of the surface of one state that another sees at the same place, over the share that the
+    /// state's own views do, 0..1; empty where states have no frame in common, or more than 25.
+    /// `[state][other]`
+    pub shared: Vec<Vec<f64>>,
 }
 
 /// Findings of one kind that [`CheckReport::summary`] shows before it counts the rest.
@@ -130,7 +134,7 @@ pub fn check(path: &Path, progress: &Progress) -> Result<CheckReport, CaptureErr
         Ok(documents) => documents,
         Err(e) => {
             findings.push(error("unreadable", e));
-            return Ok(CheckReport { findings, states: Vec::new() });
+            return Ok(CheckReport { findings, states: Vec::new(), shared: Vec::new() });
         }
     };
     let mut problems = Vec::new();
@@ -138,7 +142,7 @@ pub fn check(path: &Path, progress: &Progress) -> Result<CheckReport, CaptureErr
     findings.extend(recording.uncut().map(|e| error("uncut-film", e)));
     description::check(&documents, &recording, problems, &mut findings);
     let looks = pixels::check(&documents, &recording, progress, &mut findings)?;
-    space::check(&documents, &recording, &looks, &mut findings);
+    let shared = space::check(&documents, &recording, &looks, &mut findings);
     findings.sort_by_key(|f| f.severity);
     // Those that are there: a number may be mistyped by many zeros.
     let there: BTreeSet<usize> = recording.frames.iter().map(|f| f.state).collect();
@@ -158,7 +162,7 @@ pub fn check(path: &Path, progress: &Progress) -> Result<CheckReport, CaptureErr
             }
         })
         .collect();
-    Ok(CheckReport { findings, states })
+    Ok(CheckReport { findings, states, shared })
 }
 
 fn error(code: &'static str, e: CaptureError) -> Finding {

@@ -18,7 +18,13 @@ const VIEWS: usize = 8;
 const AGREES: f64 = 0.7;
 const DISAGREES: f64 = 0.5;
 
-pub(super) fn check(documents: &[Document], recording: &Recording, looks: &[Option<Look>], out: &mut Vec<Finding>) {
+/// Findings, and how much of their surface states share ([`CheckReport::shared`](super::CheckReport)).
+pub(super) fn check(
+    documents: &[Document],
+    recording: &Recording,
+    looks: &[Option<Look>],
+    out: &mut Vec<Finding>,
+) -> Vec<Vec<f64>> {
     one_place(recording, out);
     if !look_inward(recording) {
         let place = format!("{}: frames[].transform_matrix", recording.root.display());
@@ -28,23 +34,24 @@ pub(super) fn check(documents: &[Document], recording: &Recording, looks: &[Opti
             CaptureError::new("the cameras look away from each other's middle: their axes are OpenCV's", place, hint);
         out.push(Finding { fix: Some(Fix::FlipCameraAxes), ..error("camera-axes", e) });
         // With wrong axes nothing below means anything.
-        return;
+        return Vec::new();
     }
     empty_depth(documents, recording, looks, out);
     let by_state: Vec<Vec<usize>> = (0..recording.n_states).map(|s| some_views(recording, looks, s)).collect();
     if let Some(finding) = depth_unit(recording, looks, &by_state) {
         out.push(finding);
-        return;
+        return Vec::new();
     }
     if !recording.registered {
         // What lies where says nothing before the worlds are brought together.
         let place = format!("{}: registered = false", recording.root.display());
         let hint = "nothing to do: `hingecast build` brings them together, or says what it lacks";
         out.push(warning("own-worlds", "each state has a world of its own".into(), place, hint));
-        return;
+        return Vec::new();
     }
-    states_apart(recording, looks, &by_state, out);
+    let shared = states_apart(recording, looks, &by_state, out);
     out.extend(super::motion::nothing_moves(recording, looks, &by_state));
+    shared
 }
 
 /// Cameras of a state that stand at one point give no depth.
@@ -179,8 +186,13 @@ fn depth_unit(recording: &Recording, looks: &[Option<Look>], by_state: &[Vec<usi
 }
 
 /// A state whose cloud lies elsewhere as a whole: its points meet the surfaces of no other state,
-/// though they meet those of their own.
-fn states_apart(recording: &Recording, looks: &[Option<Look>], by_state: &[Vec<usize>], out: &mut Vec<Finding>) {
+/// though they meet those of their own. Answers how much of their surface states share.
+fn states_apart(
+    recording: &Recording,
+    looks: &[Option<Look>],
+    by_state: &[Vec<usize>],
+    out: &mut Vec<Finding>,
+) -> Vec<Vec<f64>> {
     let n = by_state.len();
     let clouds: Vec<Vec<Vec<DVec3>>> = by_state
         .iter()
@@ -191,7 +203,7 @@ fn states_apart(recording: &Recording, looks: &[Option<Look>], by_state: &[Vec<u
         .collect();
     let all: Vec<DVec3> = clouds.iter().flatten().flatten().copied().collect();
     if n < 2 || all.len() < 100 {
-        return;
+        return Vec::new();
     }
     // A tolerance of 4 % of a typical state's extent: the lid of a closed laptop counts as its
     // keyboard.
@@ -237,7 +249,18 @@ fn states_apart(recording: &Recording, looks: &[Option<Look>], by_state: &[Vec<u
             out.push(finding);
         }
     }
+    if n > SHOWN {
+        return Vec::new();
+    }
+    let of_state = |s: usize| -> Vec<f64> {
+        let own = agreement(s, s).max(1e-9);
+        (0..n).map(|r| if r == s { 1.0 } else { (agreement(s, r) / own).min(1.0) }).collect()
+    };
+    (0..n).map(of_state).collect()
 }
+
+/// States of which it is answered how much of their surface they share.
+const SHOWN: usize = 25;
 
 /// Even a laptop whose lid makes half of it keeps more than this share of its agreement between two
 /// states.

@@ -32,7 +32,7 @@ pub use film::{FILM_STATES, Film, HandReport, film, film_sentences};
 pub use hingecast_prepare::Wanted;
 pub use masks::{find_masks, place_at};
 pub use page::write_page;
-pub use sheet::contact_sheet;
+pub use sheet::{SHEET_CAPTION, contact_sheet};
 pub use words::sentence;
 
 /// The name of the step, and of its folder in a run.

@@ -1,7 +1,7 @@
 //! What `check` found, for a person who would rather look than read.
 
 use super::raw_depths::RawDepths;
-use super::sheet::contact_sheet;
+use super::sheet::{SHEET_CAPTION, contact_sheet};
 use crate::failure::{Failure, Result};
 use crate::report::html::{doubts, escape, head};
 use glam::{DVec2, DVec3};
@@ -30,12 +30,12 @@ pub fn write_page(recording: &Path, report: &CheckReport, page: &Path) -> Result
         let name = sheet.file_name().unwrap_or_default().to_string_lossy().into_owned();
         let _ = write!(
             out,
-            "<h2>Pictures and masks</h2><figure><img src=\"{0}\" alt=\"{0}\"><figcaption>a row a state; what the masks leave out \
-             is dark</figcaption></figure>",
+            "<h2>Pictures and masks</h2><figure><img src=\"{0}\" alt=\"{0}\"><figcaption>{SHEET_CAPTION}</figcaption></figure>",
             escape(&name)
         );
         from_above(&mut out, &recording)?;
     }
+    shared(&mut out, &report.shared);
     let _ = write!(out, "<h2>Frames</h2><table><tr><th>state<th>usable<th>partly hidden<th>occluded<th>held out</tr>");
     for s in &report.states {
         let _ = write!(
@@ -46,6 +46,32 @@ pub fn write_page(recording: &Path, report: &CheckReport, page: &Path) -> Result
     }
     let _ = writeln!(out, "</table></html>");
     write_whole(page, out.as_bytes()).map_err(Failure::io(page))
+}
+
+/// Which states disagree: how much of the surface of each the others see where it is.
+fn shared(out: &mut String, shared: &[Vec<f64>]) {
+    if shared.len() < 2 {
+        return;
+    }
+    let heads: String = (0..shared.len()).map(|state| format!("<th>{state}")).collect();
+    let _ = write!(out, "<h2>What agrees with what</h2><table><tr><th>state{heads}</tr>");
+    for (state, row) in shared.iter().enumerate() {
+        let _ = write!(out, "<tr><th>{state}");
+        for (other, share) in row.iter().enumerate() {
+            let percent = (100.0 * share).round();
+            let hue = (120.0 * share).round();
+            let _ = match other == state {
+                true => write!(out, "<td>"),
+                false => write!(out, "<td class=n style=\"background:hsl({hue} 70% 85%)\">{percent}"),
+            };
+        }
+        let _ = write!(out, "</tr>");
+    }
+    let _ = write!(
+        out,
+        "</table><p>Of the surface of a state (row), the percentage that another (column) sees at the same place, against \
+         what its own views do. What moved lowers it; a state that is low in its row and its column lies apart.</p>"
+    );
 }
 
 /// All states' surfaces over each other and where their cameras stood, seen along up.

@@ -11,20 +11,21 @@ const WIDTH: u32 = 240;
 /// States that are shown.
 const STATES: usize = 12;
 
+/// What a sheet says below itself.
+pub const SHEET_CAPTION: &str =
+    "a row a state, of a film its pictures in the order of time; what is not the object is dark";
+
 /// One row a state: pictures spread over its views, the background at a quarter of its brightness,
-/// the object's border red.
+/// the object's border red. Of a film a row of the scan, and then its states one after the other.
 ///
 /// # Errors
 /// When a picture cannot be read.
 pub fn contact_sheet(recording: &Recording) -> Result<RgbImage> {
-    let states: Vec<usize> = (0..recording.n_states).step_by(recording.n_states.div_ceil(STATES).max(1)).collect();
     let mut rows = Vec::new();
-    for &state in &states {
-        let frames = recording.frames_of(state, Split::Train);
-        let n = frames.len().min(ACROSS);
+    for frames in frames(recording) {
         let mut row = Vec::new();
-        for k in 0..n {
-            let view = recording.load(frames[k * frames.len() / n])?;
+        for frame in frames {
+            let view = recording.load(frame)?;
             let (w, h) = (view.camera.width, view.camera.height);
             let pixel = |x: u32, y: u32| {
                 let i = y as usize * w + x as usize;
@@ -59,4 +60,22 @@ pub fn contact_sheet(recording: &Recording) -> Result<RgbImage> {
         y += height(row);
     }
     Ok(sheet)
+}
+
+/// The frames of every row.
+fn frames(recording: &Recording) -> Vec<Vec<usize>> {
+    let of_state = |state: usize, most: usize| -> Vec<usize> {
+        let frames = recording.frames_of(state, Split::Train);
+        let n = frames.len().min(most);
+        (0..n).map(|k| frames[k * frames.len() / n]).collect()
+    };
+    let some = |first: usize, most: usize| {
+        let n = recording.n_states.saturating_sub(first);
+        (first..recording.n_states).step_by(n.div_ceil(most).max(1))
+    };
+    if !recording.film {
+        return some(0, STATES).map(|state| of_state(state, ACROSS)).collect();
+    }
+    let film: Vec<usize> = some(1, ACROSS * (STATES - 1)).flat_map(|state| of_state(state, 1)).collect();
+    std::iter::once(of_state(0, ACROSS)).chain(film.chunks(ACROSS).map(<[usize]>::to_vec)).collect()
 }

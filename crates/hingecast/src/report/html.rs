@@ -43,9 +43,9 @@ pub(crate) fn page(run: &RunFolder, content: &Content) -> String {
     if run.folder(crate::prepare::STAGE).join("masks.png").is_file() {
         let _ = write!(
             out,
-            "<h2>Masks that were found</h2><figure><img src=\"../{}/masks.png\" alt=\"masks\"><figcaption>a row a state; what \
-             is not the object is dark</figcaption></figure>",
-            crate::prepare::STAGE
+            "<h2>Masks that were found</h2><figure><img src=\"../{}/masks.png\" alt=\"masks\"><figcaption>{}</figcaption></figure>",
+            crate::prepare::STAGE,
+            crate::prepare::SHEET_CAPTION
         );
     }
     joints(&mut out, content);
