@@ -13,7 +13,6 @@ fn numbers(value: &serde_json::Value) -> Vec<f64> {
 }
 
 #[test]
-#[ignore = "a minute and a half of one core; the steps have tests of their own in crates/prepare/tests/film.rs"]
 fn a_scan_and_a_film_become_parts_and_joints() {
     let dir = tempfile::tempdir().unwrap();
     let dir = dir.path();

@@ -74,7 +74,7 @@ pub(super) fn store(
     // What was written should open; if not, the source has gaps in its states.
     let mut notes = notes(&changes, min_confidence);
     notes.extend(labels::note(shots, changes.iter().map(|c| &c.labels)));
-    Ok((Recording::open(&out)?, notes))
+    Ok((Recording::open_uncut(&out)?, notes))
 }
 
 /// What happened to a picture on its way.
