@@ -3,6 +3,7 @@
 
 pub mod gauss_newton;
 pub mod path;
+pub mod question;
 pub mod rival;
 mod sweep_film;
 pub mod sweep_values;

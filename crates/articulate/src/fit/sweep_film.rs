@@ -5,10 +5,9 @@
 //! picture, put where it would be in the scan, could be there.
 
 use super::path::smooth_path;
-use super::sweep_values::{Question, Sweep, agreement_above};
+use super::question::{Question, Sweep, Worth, agreement_above, grid_agreement};
 use crate::observe::occupancy::Answer;
 use crate::observe::sample::{Motion, Sample};
-use crate::score::agreement::EMPTY_COST;
 use hingecast_geom::{Pose, Screw};
 
 /// Scores so far below the best of a picture need not be exact.
@@ -47,6 +46,7 @@ pub(super) fn sweep_film(
     let nearest = (0..grid.len()).fold(0, |a, b| if grid[b].abs() < grid[a].abs() { b } else { a });
     let closer = |a: usize, b: usize| of_scan[b] == of_scan[a] && b.abs_diff(nearest) < a.abs_diff(nearest);
     let scan = (0..grid.len()).fold(0, |a, b| if of_scan[b] > of_scan[a] || closer(a, b) { b } else { a });
+    let anything = Question { worth: Worth::ANY, ..*question };
     let both = |t: usize| {
         let mut scores = forth(t);
         let own = moved_in(question, parent_poses, t);
@@ -56,7 +56,7 @@ pub(super) fn sweep_film(
             scores.iter_mut().zip(&motions).filter(|(s, _)| !own.is_empty() && **s > highest - PRUNED)
         {
             let m = parent_poses[0] * motions[scan] * (parent_poses[t] * *motion).inverse();
-            *score += weight * in_scan(question, &own, &m.into());
+            *score += weight * grid_agreement(&anything, 0, &own, &m.into());
         }
         scores
     };
@@ -81,14 +81,4 @@ fn moved_in(question: &Question, parent_poses: &[Pose], t: usize) -> Vec<Sample>
     };
     let all: Vec<Sample> = evidence.samples[first..last].iter().filter(moved).copied().collect();
     all.iter().step_by(all.len().div_ceil(BACK).max(1)).copied().collect()
-}
-
-/// How well samples, carried by `m`, fit into the scan.
-fn in_scan(question: &Question, samples: &[Sample], m: &Motion) -> f32 {
-    let says = |s: &Sample| match question.evidence.spaces[0].ask(m.apply(s.point), m.rot * s.normal) {
-        Answer::Surface => 1.0,
-        Answer::Free => -EMPTY_COST,
-        Answer::Silent => 0.0,
-    };
-    samples.iter().map(says).sum::<f32>() / samples.len() as f32
 }

@@ -1,59 +1,12 @@
 //! One screw against all states: at which value does each state agree with it, and how well.
 
+use super::question::{Question, Sweep, Worth, agreement_above, grid_agreement};
 use super::sweep_film::sweep_film;
 use crate::model::motions::in_parent_frame;
 use crate::observe::evidence::Evidence;
-use crate::observe::occupancy::Answer;
 use crate::observe::sample::{Motion, Sample};
-use crate::score::agreement::EMPTY_COST;
-use crate::score::claims::{Claims, POSSIBLE};
+use crate::score::claims::Claims;
 use hingecast_geom::{Joint, Pose, Screw};
-
-/// Value per state and how well the states agree.
-#[derive(Clone, Debug)]
-pub struct Sweep {
-    /// Relative to the source state.
-    pub values: Vec<f64>,
-    /// Per state: surface met minus emptiness entered, shares of the samples.
-    pub scores: Vec<f32>,
-}
-
-/// What surface counts that known parts claim, against 1 for surface that none does.
-#[derive(Clone, Copy)]
-pub struct Worth {
-    /// A known part explains it already.
-    pub taken: f32,
-    /// A known part could explain it.
-    pub possible: f32,
-}
-
-impl Worth {
-    /// For parts that are sought.
-    pub const SOUGHT: Self = Self { taken: 0.25, possible: 0.8 };
-    /// Surface that another part explains, or could explain, says nothing.
-    pub const OWN: Self = Self { taken: 0.0, possible: 0.0 };
-    /// Everything that is there may be the part.
-    pub const ANY: Self = Self { taken: 1.0, possible: 1.0 };
-
-    fn of(&self, claim: u8) -> f32 {
-        match claim {
-            0 => 1.0,
-            POSSIBLE => self.possible,
-            _ => self.taken,
-        }
-    }
-}
-
-/// What a sweep asks.
-#[derive(Clone, Copy)]
-pub struct Question<'a> {
-    /// What was seen.
-    pub evidence: &'a Evidence,
-    /// Of the parts that are known.
-    pub claims: &'a Claims,
-    /// What claimed surface counts.
-    pub worth: Worth,
-}
 
 /// Asks every state for the value of a screw.
 ///
@@ -96,29 +49,6 @@ pub fn sweep_values(
     Sweep { values, scores }
 }
 
-/// Share of the samples that meet surface in the grid, minus what enters empty space.
-pub fn grid_agreement(question: &Question, state: usize, samples: &[Sample], m: &Motion) -> f32 {
-    agreement_above(question, state, samples, m, f32::NEG_INFINITY)
-}
-
-/// The agreement, or little once it is sure to stay below `floor`.
-pub(super) fn agreement_above(question: &Question, state: usize, samples: &[Sample], m: &Motion, floor: f32) -> f32 {
-    let n = samples.len() as f32;
-    let space = &question.evidence.spaces[state];
-    let mut sum = 0.0;
-    for (k, s) in samples.iter().enumerate() {
-        match space.ask_cell(m.apply(s.point), m.rot * s.normal) {
-            (Answer::Surface, cell) => sum += question.worth.of(question.claims.at(state, cell)),
-            (Answer::Free, _) => sum -= EMPTY_COST,
-            (Answer::Silent, _) => {}
-        }
-        if k % 16 == 15 && sum + (n - 1.0 - k as f32) < floor * n {
-            return -EMPTY_COST;
-        }
-    }
-    sum / n
-}
-
 /// Values worth trying: all turns, or slides across the object. Radians or scene units.
 pub fn full_range(screw: &Screw, extent: f32) -> [f64; 2] {
     if screw.kind.turns() { [-std::f64::consts::PI, std::f64::consts::PI] } else { [-extent as f64, extent as f64] }
@@ -129,7 +59,7 @@ pub fn full_range(screw: &Screw, extent: f32) -> [f64; 2] {
 const CLEARLY_BETTER: f32 = 0.01;
 
 /// The values of a joint that the states agree with best, for `members` of its child, counted from
-/// the first state; the held ones unless others are clearly better.
+/// the first state; but for films the held ones unless others are clearly better.
 pub fn improved_values(
     evidence: &Evidence,
     claims: &Claims,
@@ -140,11 +70,9 @@ pub fn improved_values(
     let samples = in_parent_frame(joint, members, parent_poses);
     let question = Question { evidence, claims, worth: Worth::SOUGHT };
     let mut found = sweep_joint(&question, joint, &samples, parent_poses);
-    if evidence.film {
-        let zero = found.values[0];
-        return found.values.iter().map(|v| v - zero).collect();
-    }
-    for (s, parent) in parent_poses.iter().enumerate() {
+    // Along a film the path counts, not a picture.
+    let single = if evidence.film { &[] } else { parent_poses };
+    for (s, parent) in single.iter().enumerate() {
         let held = Motion::from(*parent * joint.screw.motion(joint.values[s]));
         if found.scores[s] < grid_agreement(&question, s, &samples, &held) + CLEARLY_BETTER {
             found.values[s] = joint.values[s];

@@ -1,7 +1,8 @@
 //! Whether the samples of a part want two values of its joint, and which.
 
 use super::value_search::offsets;
-use crate::fit::sweep_values::{Question, Worth, sweep_joint};
+use crate::fit::question::{Question, Worth};
+use crate::fit::sweep_values::sweep_joint;
 use crate::label::by_likelihood_ratio::agreement_gain;
 use crate::model::motions::{in_parent_frame, poses_of, state_to_state};
 use crate::model::owners::{ASKING, Owners, subset};

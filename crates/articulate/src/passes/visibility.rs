@@ -6,7 +6,8 @@
 //! the value is that of the nearest state that shows the part, where nothing of it would be seen.
 
 use super::pass::{Round, relabel};
-use crate::fit::sweep_values::{Question, Worth, grid_agreement, sweep_joint};
+use crate::fit::question::{Question, Worth, grid_agreement};
+use crate::fit::sweep_values::sweep_joint;
 use crate::model::estimate::Estimate;
 use crate::model::motions::{in_parent_frame, poses_of};
 use crate::model::owners::{ASKING, subset};

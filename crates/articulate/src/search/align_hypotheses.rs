@@ -5,7 +5,7 @@ use super::distinct::{Hypothesis, distinct};
 use super::pairs::LEAST_SAMPLES;
 use super::state_pair::StatePair;
 use crate::config::MANY_STATES;
-use crate::fit::sweep_values::{Question, Worth, grid_agreement};
+use crate::fit::question::{Question, Worth, grid_agreement};
 use crate::model::mean::mean_point;
 use crate::model::nearest_screw::nearest_screw;
 use crate::model::owners::subset;

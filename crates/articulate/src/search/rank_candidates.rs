@@ -3,7 +3,7 @@
 use super::candidates::{CANDIDATE_SAMPLES, Candidate};
 use super::fit_candidate::fit_candidate;
 use super::partial::Partial;
-use crate::fit::sweep_values::Sweep;
+use crate::fit::question::Sweep;
 use crate::model::faces::{ASKEW_RAD, along_faces};
 use crate::model::motions::poses_of;
 use crate::observe::evidence::Evidence;
