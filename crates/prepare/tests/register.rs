@@ -2,7 +2,7 @@
 
 mod common;
 
-use common::{Block, block, chest, cupboard, room, views};
+use common::{Block, MIDDLE, block, chest, cupboard, pushed, room, views};
 use glam::{DQuat, DVec3};
 use hingecast_geom::{Pose, Progress};
 use hingecast_prepare::{PrepareError, register, register::Freedom, steady};
@@ -90,11 +90,10 @@ fn a_push_is_taken_out_and_a_door_is_not() {
             .map(|k| masked(cupboard(25.0 * k as f64, if k < 2 { Pose::IDENTITY } else { push }), k as u64))
             .collect();
         let found = steady(&mut states, DVec3::Z, 0, &Progress::default()).unwrap();
-        let middle = Pose::from_trans(DVec3::new(0.1, 0.75, 0.0));
         for (state, common_from_state) in found.iter().enumerate() {
-            let stood = if state < 2 { Pose::IDENTITY } else { middle * push * middle.inverse() };
+            let stood = if state < 2 { Pose::IDENTITY } else { pushed(push) };
             let off = *common_from_state * stood;
-            let (turn, shift) = (off.angle().to_degrees(), (off.apply(middle.trans) - middle.trans).length());
+            let (turn, shift) = (off.angle().to_degrees(), (off.apply(MIDDLE) - MIDDLE).length());
             println!("{mm} mm {deg} deg state {state}: {turn:.4} deg {shift:.5} m");
             assert!(turn < 0.05 && shift < 0.001, "{mm} mm, state {state}: off by {turn} deg, {shift} m");
             assert!(mm > 0.0 || *common_from_state == Pose::IDENTITY, "nobody pushed: {common_from_state:?}");
@@ -113,8 +112,7 @@ fn a_drawer_is_no_base() {
         .collect();
     let found = steady(&mut states, DVec3::Z, 0, &Progress::default()).unwrap();
     assert!(found[..4].iter().all(|p| *p == Pose::IDENTITY), "nobody pushed: {found:?}");
-    let middle = Pose::from_trans(DVec3::new(0.1, 0.75, 0.0));
-    let off = found[4] * middle * push * middle.inverse();
-    let shift = (off.apply(middle.trans) - middle.trans).length();
+    let off = found[4] * pushed(push);
+    let shift = (off.apply(MIDDLE) - MIDDLE).length();
     assert!(off.angle().to_degrees() < 0.05 && shift < 0.001, "{} deg, {shift} m", off.angle().to_degrees());
 }

@@ -226,6 +226,9 @@ fn states_apart(
         }
         fate.on_surface as f64 / fate.all.max(1) as f64
     };
+    let table: Vec<Vec<f64>> =
+        if n <= SHOWN { (0..n).map(|s| (0..n).map(|r| agreement(s, r)).collect()).collect() } else { Vec::new() };
+    let agreement = |s: usize, r: usize| table.get(s).map_or_else(|| agreement(s, r), |own| own[r]);
     // Each state against a few others, near and far; one that agrees is enough.
     for s in 0..n {
         let own = agreement(s, s);
@@ -249,14 +252,11 @@ fn states_apart(
             out.push(finding);
         }
     }
-    if n > SHOWN {
-        return Vec::new();
-    }
-    let of_state = |s: usize| -> Vec<f64> {
-        let own = agreement(s, s).max(1e-9);
-        (0..n).map(|r| if r == s { 1.0 } else { (agreement(s, r) / own).min(1.0) }).collect()
+    let of_own = |(s, row): (usize, &Vec<f64>)| -> Vec<f64> {
+        let own = row[s].max(1e-9);
+        row.iter().enumerate().map(|(r, share)| if r == s { 1.0 } else { (share / own).min(1.0) }).collect()
     };
-    (0..n).map(of_state).collect()
+    table.iter().enumerate().map(of_own).collect()
 }
 
 /// States of which it is answered how much of their surface they share.

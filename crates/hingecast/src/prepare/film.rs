@@ -21,7 +21,7 @@ const CELLS: usize = 64;
 /// Parts that are sought then, hands among them.
 const MOST_PARTS: usize = 8;
 /// Passes that give the last digits, which hands do not need.
-const SKIPPED: [&str; 4] = ["turn_axes", "far_hinges", "align_axes", "split_coupled"];
+const SKIPPED: [&str; 3] = ["turn_axes", "far_hinges", "align_axes"];
 /// More of the object's pixels than this are no hand: the parts are wrong.
 const TOO_MANY: f64 = 0.6;
 

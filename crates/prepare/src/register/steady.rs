@@ -137,18 +137,18 @@ fn placed(scan: &Scan, before: &[(&Scan, Pose)], candidates: &[Pose], up: DVec3,
     let voxel = scan.fine_voxel;
     let (even, facing) = (balanced::evenly(&scan.fine, SAMPLES), balanced::pick(&scan.fine, SAMPLES, seed));
     let back: Vec<(&Scan, Pose)> = before.iter().map(|(other, pose)| (*other, pose.inverse())).collect();
-    let says = |(other, back): &(&Scan, Pose), x: Vec3, m: Vec3| {
-        other.ask(back.apply(x.as_dvec3()).as_vec3(), back.rotate(m.as_dvec3()).as_vec3())
-    };
     let on = |pose: &Pose, within: f32| -> Vec<bool> {
         let (moved, turned) = fine::carried(&even, pose);
         // A drawer lies on itself in a state that had it as far out; others looked through there.
-        let empty = |x: Vec3, m: Vec3| back.iter().any(|other| says(other, x, m) == Answer::Free);
+        let empty = |x: DVec3, m: DVec3| {
+            let ask = |(other, back): &(&Scan, Pose)| other.ask(back.apply(x).as_vec3(), back.rotate(m).as_vec3());
+            back.iter().any(|other| ask(other) == Answer::Free)
+        };
         let lies = |(x, m): (&Vec3, &Vec3)| {
             let Some((j, squared)) = surface.nearest(*x) else { return false };
             let n = surface.normals[j];
             let off = n.dot(*x - surface.points[j]).abs();
-            squared < (2.0 * voxel).powi(2) && m.dot(n) > 0.9 && off < within && !empty(*x, *m)
+            squared < (2.0 * voxel).powi(2) && m.dot(n) > 0.9 && off < within && !empty(x.as_dvec3(), m.as_dvec3())
         };
         moved.iter().zip(&turned).map(lies).collect()
     };

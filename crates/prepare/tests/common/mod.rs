@@ -29,11 +29,23 @@ pub fn room() -> Vec<Block> {
     ]
 }
 
+/// On the floor, under the middle of the things that are pushed.
+pub const MIDDLE: DVec3 = DVec3::new(0.1, 0.75, 0.0);
+
+/// World from world: `push` about [`MIDDLE`].
+pub fn pushed(push: Pose) -> Pose {
+    Pose::from_trans(MIDDLE) * push * Pose::from_trans(-MIDDLE)
+}
+
+/// Blocks moved by [`pushed`].
+fn moved(all: impl IntoIterator<Item = Block>, push: Pose) -> Vec<Block> {
+    let push = pushed(push);
+    all.into_iter().map(|b| Block { world_from_block: push * b.world_from_block, ..b }).collect()
+}
+
 /// A cupboard of 0.8 x 0.4 x 0.9 m before the wall whose door, on its front, is open by `door_deg`;
 /// the whole of it moved by `push` (about its own middle).
 pub fn cupboard(door_deg: f64, push: Pose) -> Vec<Block> {
-    let middle = DVec3::new(0.1, 0.75, 0.0);
-    let moved = Pose::from_trans(middle) * push * Pose::from_trans(-middle);
     // Back, sides, bottom, a board, top: hollow, as cupboards are.
     let panels = [
         block([0.1, 0.95, 0.45], [0.8, 0.02, 0.9], 0.0),
@@ -53,15 +65,12 @@ pub fn cupboard(door_deg: f64, push: Pose) -> Vec<Block> {
         half: DVec3::new(0.015, 0.02, 0.08),
         world_from_block: hinge * Pose::from_trans(DVec3::new(0.74, -0.04, 0.0)),
     };
-    let all = panels.into_iter().chain([door, handle]);
-    all.map(|b| Block { world_from_block: moved * b.world_from_block, ..b }).collect()
+    moved(panels.into_iter().chain([door, handle]), push)
 }
 
 /// A case of 0.7 x 0.4 x 0.6 m before the wall, its walls 6 cm thick, with one drawer as deep as it, pulled
 /// out by `out` m; the whole of it moved by `push` (about its own middle).
 pub fn chest(out: f64, push: Pose) -> Vec<Block> {
-    let middle = DVec3::new(0.1, 0.75, 0.0);
-    let moved = Pose::from_trans(middle) * push * Pose::from_trans(-middle);
     let case = [
         block([0.1, 0.94, 0.3], [0.7, 0.02, 0.6], 0.0),
         block([-0.22, 0.75, 0.3], [0.06, 0.4, 0.6], 0.0),
@@ -77,7 +86,7 @@ pub fn chest(out: f64, push: Pose) -> Vec<Block> {
         block([0.1, 0.91 - out, 0.28], [0.52, 0.02, 0.36], 0.0),
         block([0.1, 0.51 - out, 0.3], [0.12, 0.04, 0.03], 0.0),
     ];
-    case.into_iter().chain(drawer).map(|b| Block { world_from_block: moved * b.world_from_block, ..b }).collect()
+    moved(case.into_iter().chain(drawer), push)
 }
 
 /// What a camera sees: z, 0 where nothing is; and which block, from 1.
