@@ -21,6 +21,10 @@ pub struct Config {
     /// what they show besides may be hands.
     #[serde(skip)]
     pub film: bool,
+    /// Everything that the cameras saw, the room too, holds them where they are: what the object alone says
+    /// moves them little.
+    #[serde(skip)]
+    pub held: bool,
     /// Seed of everything random: the same seed, the same bytes.
     #[serde(skip)]
     pub seed: u64,
@@ -39,6 +43,7 @@ impl Default for Config {
             borders: true,
             resample: true,
             film: false,
+            held: false,
             seed: 0,
             skip: Vec::new(),
         }

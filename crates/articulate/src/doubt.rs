@@ -29,6 +29,13 @@ pub enum Doubt {
         /// The same where it is said to be, and where its own state measured it.
         moved: f64,
     },
+    /// The part may be the other side of another joint's part: one line, and it moves only where that does.
+    MayBeOneWith {
+        /// Name of the joint.
+        joint: String,
+        /// Name of the other.
+        other: String,
+    },
     /// Views of some states contradict the joint's value there.
     Contradicted {
         /// Name of the joint.
@@ -104,6 +111,7 @@ impl Doubt {
         match self {
             Self::Undecidable { joint, .. }
             | Self::MayNotMove { joint, .. }
+            | Self::MayBeOneWith { joint, .. }
             | Self::Contradicted { joint, .. }
             | Self::LooseAxis { joint, .. }
             | Self::LoosePivot { joint, .. }
@@ -117,14 +125,16 @@ impl Doubt {
 
     /// The same about a joint that has got another name.
     pub fn renamed(mut self, old: &str, new: &str) -> Self {
-        if let Self::MayFollow { leader, .. } = &mut self
-            && leader == old
-        {
-            *leader = new.to_string();
+        match &mut self {
+            Self::MayFollow { leader: other, .. } | Self::MayBeOneWith { other, .. } if other == old => {
+                *other = new.to_string();
+            }
+            _ => {}
         }
         match &mut self {
             Self::Undecidable { joint, .. }
             | Self::MayNotMove { joint, .. }
+            | Self::MayBeOneWith { joint, .. }
             | Self::Contradicted { joint, .. }
             | Self::LooseAxis { joint, .. }
             | Self::LoosePivot { joint, .. }
@@ -157,6 +167,11 @@ impl fmt::Display for Doubt {
                  drift, look like that",
                 100.0 * at_rest,
                 100.0 * moved
+            ),
+            Self::MayBeOneWith { joint, other } => write!(
+                f,
+                "joint '{joint}' turns about the line of '{other}', and moves only where that does: the two may be the \
+                 sides of one part"
             ),
             Self::Contradicted { joint, states } => write!(
                 f,

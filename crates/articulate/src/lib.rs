@@ -43,6 +43,7 @@ pub mod pictures;
 mod resample;
 pub mod score;
 pub mod search;
+mod shadow;
 pub mod shown;
 pub mod value_by_views;
 mod weigh_doubts;

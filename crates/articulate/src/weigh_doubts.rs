@@ -8,6 +8,7 @@ use crate::model::motions::{poses_of, state_to_state};
 use crate::model::owners::Member;
 use crate::observe::evidence::Evidence;
 use crate::score::compare::REFUTED_NATS;
+use crate::shadow::{reach, shadows};
 use crate::shown::Shown;
 use glam::{IVec3, Vec3};
 use hingecast_geom::{Certainty, Joint};
@@ -53,8 +54,15 @@ pub fn weigh_doubts(
     if tree.joints.is_empty() {
         out.push(Doubt::NothingMoves);
     }
+    let pairs: Vec<usize> = believed.shown.iter().map(|s| s.pairs).collect();
+    let reach =
+        |j: usize, along: usize| reach(&found.owners.members(evidence, tree.joints[j].child), &tree.joints[along]);
+    let shadows = shadows(&tree.joints, &reach, &pairs, evidence.lattice.voxel);
     for (j, joint) in tree.joints.iter().enumerate() {
         let name = || joint.name.clone();
+        if let Some((_, of)) = shadows.iter().find(|(own, _)| *own == j) {
+            out.push(Doubt::MayBeOneWith { joint: name(), other: tree.joints[*of].name.clone() });
+        }
         let Shown { at_rest, moved, own, .. } = &believed.shown[j];
         if believed.shown[j].against() > MOVES {
             out.push(Doubt::MayNotMove { joint: name(), at_rest: *at_rest, moved: moved.max(*own) });

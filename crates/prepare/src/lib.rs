@@ -3,6 +3,7 @@
 //!
 //! ```text
 //! settle      the views of each scan among themselves, where tracking drifted
+//! level       the frames of states that share one but for drift
 //! register    the states' frames, brought together on what stands still: pairs of scans globally, all together finely
 //! film        one camera that looks on while hands move the parts, cut into states
 //! mask        the object without masks: what moves, and what that hangs on
@@ -24,6 +25,6 @@ mod settle;
 
 pub use error::PrepareError;
 pub use mask::{MaskReport, Masks, Wanted, object_masks};
-pub use register::{Registration, apart, register, steady};
+pub use register::{Registration, apart, level, register, steady};
 pub use scan::Scan;
-pub use settle::settle;
+pub use settle::{Settled, settle};

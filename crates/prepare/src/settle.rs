@@ -3,8 +3,8 @@
 
 use crate::error::PrepareError;
 use crate::scan::extent;
-use hingecast_articulate::Depths;
 use hingecast_articulate::observe::cameras;
+use hingecast_articulate::{DepthView, Depths};
 use hingecast_geom::{Pose, Progress};
 
 /// Cells along the longest side of a scan in which its views are compared.
@@ -12,21 +12,63 @@ const CELLS: f32 = 120.0;
 /// Points of a view: a few in every cell, over all views.
 const POINTS: usize = 5000;
 
-/// Of every state and view: camera_from_world as corrected; as recorded where views agree already.
-/// What all views of a state have in common stays: only the other states could tell.
+/// At least this share of all that a scan's views show must agree between them.
+const STANDS_STILL: f64 = 0.45;
+/// The object may agree with itself worse than before by this factor: noise.
+const WORSE: f32 = 1.1;
+
+/// Cameras of all scans.
+#[derive(Clone, Debug)]
+pub struct Settled {
+    /// Of every state and view: camera_from_world as corrected; as recorded where views agree already.
+    /// What all views of a state have in common stays: only the other states could tell.
+    pub cameras: Vec<Vec<Pose>>,
+    /// Whether what is around the object stands still with it in every scan.
+    pub held: bool,
+}
+
+/// Settles the cameras of each scan. Views' pixels of class `OBJECT` of `all` are everything that was seen, of
+/// `object` the object alone, if there are masks: a state in which it agrees less with itself afterwards
+/// stays as it was recorded. What is around a turntable holds no camera.
 ///
 /// # Errors
 /// A view that cannot be read, the wish to stop.
-pub fn settle(depths: &mut dyn Depths, progress: &Progress) -> Result<Vec<Vec<Pose>>, PrepareError> {
-    let n = depths.n_states();
-    let mut out = Vec::new();
+pub fn settle(
+    all: &mut dyn Depths,
+    mut object: Option<&mut dyn Depths>,
+    progress: &Progress,
+) -> Result<Settled, PrepareError> {
+    let n = all.n_states();
+    let mut out = Settled { cameras: Vec::new(), held: true };
     for state in 0..n {
         progress.report(state, n, "views of each scan")?;
-        let mut views = depths.views(state)?;
+        let mut views = all.views(state)?;
+        let recorded = poses(&views);
         if let Some((lo, hi)) = extent(&views, 0.0) {
-            cameras::align(&mut views, (hi - lo).max_element() / CELLS, POINTS);
+            cameras::align(&mut views, (hi - lo).max_element() / CELLS, POINTS, cameras::TETHER);
         }
-        out.push(views.iter().map(|v| v.camera.camera_from_world).collect());
+        let mut settled = poses(&views);
+        if let Some((lo, hi)) = extent(&views, 0.0) {
+            let share = cameras::agreement(&views, (hi - lo).max_element() / CELLS, POINTS);
+            out.held &= share > STANDS_STILL;
+        }
+        if let Some(object) = object.as_deref_mut().filter(|_| settled != recorded) {
+            let mut views = object.views(state)?;
+            if let Some((lo, hi)) = extent(&views, 0.0) {
+                let mut off = |cameras: &[Pose]| {
+                    views.iter_mut().zip(cameras).for_each(|(v, c)| v.camera.camera_from_world = *c);
+                    cameras::disagreement(&views, (hi - lo).max_element() / CELLS, cameras::POINTS)
+                };
+                if off(&settled) > WORSE * off(&recorded) {
+                    (settled, out.held) = (recorded, false);
+                }
+            }
+        }
+        out.cameras.push(settled);
     }
     Ok(out)
+}
+
+fn poses(views: &[DepthView]) -> Vec<Pose> {
+    views.iter().map(|v| v.camera.camera_from_world).collect()
 }

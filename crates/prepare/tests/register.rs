@@ -2,7 +2,7 @@
 
 mod common;
 
-use common::{Block, MIDDLE, block, chest, cupboard, pushed, room, views};
+use common::{Block, MIDDLE, block, chest, cupboard, pushed, rack, room, views};
 use glam::{DQuat, DVec3};
 use hingecast_geom::{Pose, Progress};
 use hingecast_prepare::{PrepareError, register, register::Freedom, steady};
@@ -43,6 +43,23 @@ fn scans_with_a_world_each_come_together() {
         println!("{turn} deg {shift} m {:#?} {:?}", found.pairs, found.circle);
         assert!(turn < 0.1 && shift < 0.001, "{turn} deg, {shift} m: {:#?}", found.pairs);
     }
+}
+
+/// A thing of many facings that was pushed by a coarse cell: the room holds the worlds, not the thing, nor
+/// something between both.
+#[test]
+fn a_pushed_thing_does_not_drag_the_world_along() {
+    let worlds = own_worlds(4, 0.0);
+    let push = Pose::new(DQuat::from_rotation_z(0.035), DVec3::new(0.025, -0.017, 0.0));
+    let state = |k: usize| {
+        let thing = rack(25.0 * k as f64, if k < 3 { Pose::IDENTITY } else { push });
+        views(&[room(), thing].concat(), &worlds[k], 12, k as u64)
+    };
+    let mut states: Vec<_> = (0..4).map(state).collect();
+    let found = register(&mut states, Freedom::AboutUp(DVec3::Z), 0, &Progress::default()).unwrap();
+    let (turn, shift) = error(&found.common_from_state, &worlds);
+    println!("{turn} deg {shift} m {:?}", found.circle);
+    assert!(turn < 0.1 && shift < 0.001, "{turn} deg, {shift} m: {:#?}", found.pairs);
 }
 
 #[test]

@@ -23,7 +23,7 @@ const FEW: usize = 120;
 /// Gates of the rounds, voxels.
 const GATES: [f64; 6] = [1.5, 1.5, 1.0, 1.0, 0.7, 0.7];
 /// Pull towards the pose that the view's own state gave it, share of the pull towards the surface.
-const TETHER: f64 = 0.003;
+pub const TETHER: f64 = 0.003;
 /// A point's label is that of the nearest sample of its state within this many voxels.
 const NEAR: f32 = 1.5;
 
@@ -40,8 +40,8 @@ pub fn base(evidence: &Evidence, labels: &[Vec<u8>]) -> Surface {
 }
 
 /// Corrects the cameras of one state's views in place. `labels`: the part of every point of this
-/// state's cloud.
-pub fn align(views: &mut [DepthView], evidence: &Evidence, state: usize, labels: &[u8], base: &Surface) {
+/// state's cloud; `tether`: [`TETHER`], or more where the recorded poses are good.
+pub fn align(views: &mut [DepthView], evidence: &Evidence, state: usize, labels: &[u8], base: &Surface, tether: f64) {
     let (cloud, voxel) = (&evidence.clouds[state], evidence.lattice.voxel);
     let stands = |x: Vec3| {
         let near = cloud.nearest(x).filter(|(_, squared)| *squared < (NEAR * voxel).powi(2));
@@ -60,7 +60,7 @@ pub fn align(views: &mut [DepthView], evidence: &Evidence, state: usize, labels:
             return;
         }
         let gates = GATES.map(|g| g * voxel as f64);
-        let (pose, report) = icp::align_tethered(&points, &normals, base, Pose::IDENTITY, &gates, TETHER);
+        let (pose, report) = icp::align_tethered(&points, &normals, base, Pose::IDENTITY, &gates, tether);
         let moved = Motion::from(pose);
         let far = points.iter().map(|x| moved.apply(*x).distance(*x)).fold(0.0, f32::max);
         if report.inliers > 0.3 && far < 2.0 * voxel {
@@ -118,7 +118,7 @@ mod tests {
         let base = base(&whole, &[vec![0; whole.clouds[0].points.len()]]);
         let here = gathered(&disturbed);
         let mut views = disturbed();
-        align(&mut views, &here, 0, &vec![0; here.clouds[0].points.len()], &base);
+        align(&mut views, &here, 0, &vec![0; here.clouds[0].points.len()], &base, TETHER);
         // This one sees three faces of the box: nothing is open.
         let error = |view: &DepthView| {
             let back = view.camera.camera_from_world.inverse() * cameras[1].camera_from_world;
@@ -128,7 +128,7 @@ mod tests {
         assert!(error(&views[1]) < 0.25 * before, "{} of {before}", error(&views[1]));
         // Nothing that stands still in sight: the camera stays.
         let mut views = disturbed();
-        align(&mut views, &here, 0, &vec![1; here.clouds[0].points.len()], &base);
+        align(&mut views, &here, 0, &vec![1; here.clouds[0].points.len()], &base, TETHER);
         assert_eq!(error(&views[1]), before);
     }
 }

@@ -64,6 +64,7 @@ pub(super) fn store(
         up: source.up,
         registered: source.registered,
         film: source.film,
+        settled: false,
     };
     recording.write()?;
     // Folders that this source did not need; those with files refuse to go.

@@ -90,6 +90,9 @@ pub struct Recording {
     /// State 0 is a scan from all sides; the other states are cut out of a film of play: a few views
     /// each, and hands may be in them. `time` counts in the film.
     pub film: bool,
+    /// Everything that the scans show, the room too, holds the cameras where they are now. No file says
+    /// so: what looked at all of it does, before a build.
+    pub settled: bool,
 }
 
 /// Largest tolerated entry of |R'R - 1|: json files with 4 digits stay below, a scaled or sheared
@@ -176,7 +179,7 @@ impl Recording {
         let n_states = count_states(&frames, documents, problems);
         let folder = || root.file_name().map(|n| n.to_string_lossy().into_owned()).unwrap_or("recording".into());
         let name = name.unwrap_or_else(folder);
-        Self { root, name, frames, n_states, metric, up, registered, film }
+        Self { root, name, frames, n_states, metric, up, registered, film, settled: false }
     }
 
     /// Whether a state is cut out of a film: a picture or a few of one camera, hands in them.

@@ -25,7 +25,7 @@ pub fn run(session: &Session, args: &Mask) -> Result<Outcome> {
     let progress = session.ui.stage("mask");
     // Cameras that drifted are corrected for the search alone: the poses of the recording stay.
     let mut settled = recording.clone();
-    prepare::settle(&mut settled, &progress)?;
+    prepare::settle(&mut settled, false, &progress)?;
     let report = prepare::find_masks(&mut settled, &wanted, &folder, args.seed, &progress)?;
     drop(progress);
     for (frame, found) in recording.frames.iter_mut().zip(settled.frames) {

@@ -45,7 +45,7 @@ pub struct Film {
 /// A film that does not fit the scan, or of which hardly anything is left; a picture that cannot be read
 /// or deleted; the wish to stop.
 pub fn film(recording: &mut Recording, most: usize, seed: u64, progress: &Progress) -> Result<Film> {
-    settle(recording, progress)?;
+    settle(recording, false, progress)?;
     let registration = register(recording, seed, progress)?;
     let error = |e: PrepareError| failure(e, recording);
     let mut depths = RawDepths::new(recording);
@@ -131,6 +131,7 @@ pub(super) fn find_hands(
         cells: CELLS,
         max_parts: MOST_PARTS,
         align_cameras: false,
+        held: false,
         borders: false,
         resample: false,
         film: true,

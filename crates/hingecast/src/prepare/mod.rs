@@ -8,6 +8,7 @@ mod examine;
 mod film;
 mod masks;
 mod page;
+mod places;
 mod raw_depths;
 mod sheet;
 mod words;
@@ -17,27 +18,25 @@ use crate::stage::{RunFolder, stamp, write_json};
 use crate::watcher::Watcher;
 use hingecast_capture::{Recording, Split};
 use hingecast_geom::{Pose, Progress};
-use hingecast_prepare::register::Freedom;
-use hingecast_prepare::{MaskReport, PrepareError, Registration};
+use hingecast_prepare::{MaskReport, Registration};
 use masks::{Pixels, restore_pixels};
-use raw_depths::RawDepths;
+use places::{apply, level, put_cameras, take_pushes_out};
 use serde::{Deserialize, Serialize};
-use std::collections::BTreeMap;
 use std::path::Path;
 use std::time::Instant;
-use words::failure;
 
 pub use examine::check;
 pub use film::{FILM_STATES, Film, HandReport, film, film_sentences};
 pub use hingecast_prepare::Wanted;
 pub use masks::{find_masks, place_at};
 pub use page::write_page;
+pub use places::{register, settle};
 pub use sheet::{SHEET_CAPTION, contact_sheet};
 pub use words::sentence;
 
 /// The name of the step, and of its folder in a run.
 pub const STAGE: &str = "prepare";
-/// With at least this share of the pixels known, pictures without masks show a room.
+/// With at least this share of the pixels known, pictures show a room.
 const FILLED: f64 = 0.6;
 
 /// `prepare/prepare.json`.
@@ -47,6 +46,13 @@ pub struct Prepared {
     /// scan shows corrects it. Empty: the views of each scan agreed.
     #[serde(default)]
     pub cameras: Vec<Pose>,
+    /// Of every state: the frame of state 0 from the recorded one, where the states share a frame but for
+    /// what tracking drifted from scan to scan, as the room shows it. Empty: they agree.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub level: Vec<Pose>,
+    /// Whether the room around the object holds all cameras: the search for parts lets them be.
+    #[serde(default)]
+    pub settled: bool,
     /// How the states' worlds lie to each other, where each had its own.
     pub registration: Option<Registration>,
     /// How the object was found, where there were no masks. Its masks lie beside.
@@ -66,8 +72,8 @@ pub struct Prepared {
 impl Prepared {
     /// Whether the recording was as it should be.
     fn is_nothing(&self) -> bool {
-        let in_place = self.cameras.is_empty() && self.registration.is_none() && self.pushes.is_empty();
-        in_place && self.masks.is_none() && self.hands.is_none()
+        let placed = self.cameras.is_empty() && self.level.is_empty() && self.registration.is_none();
+        placed && self.pushes.is_empty() && self.masks.is_none() && self.hands.is_none()
     }
 }
 
@@ -78,6 +84,8 @@ pub struct Needs {
     pub registration: bool,
     /// It has no masks, and shows a room.
     pub masks: bool,
+    /// Its depth shows the room around the object.
+    pub room: bool,
 }
 
 impl Needs {
@@ -88,63 +96,14 @@ impl Needs {
     pub fn of(recording: &Recording) -> Result<Self> {
         let masked = recording.frames.iter().any(|f| f.mask.is_some());
         let first = recording.frames_of(0, Split::Train);
-        let masks = !masked && !first.is_empty() && {
-            let view = recording.load(first[0])?;
+        let (mut room, mut all) = (false, false);
+        if let Some(&first) = first.first() {
+            let view = recording.load(first)?;
             let known = view.depth.iter().filter(|z| **z > 0.0).count() as f64;
-            view.mask.iter().all(|m| *m == 1) && known >= FILLED * view.depth.len() as f64
-        };
-        Ok(Self { registration: !recording.registered, masks })
-    }
-}
-
-/// Corrects cameras that drifted along a scan, in a recording that shows a room. Answers all of them
-/// (see [`Prepared::cameras`]), or nothing when none moved.
-///
-/// # Errors
-/// A picture that cannot be read; the wish to stop.
-pub fn settle(recording: &mut Recording, progress: &Progress) -> Result<Vec<Pose>> {
-    let settled = hingecast_prepare::settle(&mut RawDepths::new(recording), progress);
-    let settled = settled.map_err(|e| failure(e, recording))?;
-    let frames = (0..settled.len()).flat_map(|state| recording.frames_of(state, Split::Train));
-    let by_frame: BTreeMap<usize, Pose> = frames.zip(settled.into_iter().flatten()).collect();
-    if by_frame.iter().all(|(&i, pose)| recording.frames[i].camera.camera_from_world == *pose) {
-        return Ok(Vec::new());
-    }
-    let cameras: Vec<Pose> = by_frame.into_values().collect();
-    put_cameras(recording, &cameras);
-    Ok(cameras)
-}
-
-/// Gives every training frame that is used its camera.
-fn put_cameras(recording: &mut Recording, cameras: &[Pose]) {
-    let training = recording.frames.iter_mut().filter(|f| f.split == Split::Train && !f.occluded);
-    training.zip(cameras).for_each(|(frame, pose)| frame.camera.camera_from_world = *pose);
-}
-
-/// Brings the states' worlds together: cameras of every state in the frame of state 0.
-///
-/// # Errors
-/// Scans that have too little in common, or fit in two ways; a picture that cannot be read; the
-/// wish to stop.
-pub fn register(recording: &mut Recording, seed: u64, progress: &Progress) -> Result<Registration> {
-    let mut depths = RawDepths::new(recording);
-    let up = Freedom::AboutUp(recording.up);
-    let found = match hingecast_prepare::register(&mut depths, up, seed, progress) {
-        // Up may not be what the file says.
-        Err(PrepareError::Apart { .. }) => hingecast_prepare::register(&mut depths, Freedom::Any, seed, progress),
-        other => other,
-    };
-    let found = found.map_err(|e| failure(e, recording))?;
-    apply(recording, &found.common_from_state);
-    recording.registered = true;
-    Ok(found)
-}
-
-fn apply(recording: &mut Recording, common_from_state: &[Pose]) {
-    for frame in &mut recording.frames {
-        if let Some(common_from_own) = common_from_state.get(frame.state) {
-            frame.camera.camera_from_world = frame.camera.camera_from_world * common_from_own.inverse();
+            room = known >= FILLED * view.depth.len() as f64;
+            all = view.mask.iter().all(|m| *m == 1);
         }
+        Ok(Self { registration: !recording.registered, masks: !masked && all && room, room })
     }
 }
 
@@ -198,8 +157,20 @@ fn prepared(
     let needs = Needs::of(recording)?;
     let mut prepared = Prepared::default();
     // The pictures of a film were placed on its scan when they were imported.
-    if (needs.registration || needs.masks) && !recording.film {
-        prepared.cameras = settle(recording, progress)?;
+    if (needs.registration || needs.room) && !recording.film {
+        let masked = recording.frames.iter().any(|f| f.mask.is_some());
+        (prepared.cameras, prepared.settled) = settle(recording, masked, progress)?;
+        if !needs.registration && recording.n_states > 1 {
+            let held;
+            (prepared.level, held) = level(recording, seed, progress)?;
+            prepared.settled &= held;
+            if !prepared.level.is_empty() {
+                let turn = prepared.level.iter().map(|p| p.angle().to_degrees()).fold(0.0, f64::max);
+                watcher.say(&format!(
+                    "the room says that the states' frames are off by up to {turn:.2} deg: brought together on it"
+                ));
+            }
+        }
     }
     if needs.registration {
         let found = register(recording, seed, progress)?;
@@ -228,31 +199,6 @@ fn prepared(
     Ok(prepared)
 }
 
-/// Brings states in which the object as a whole stands elsewhere back to where it stood. Answers by what,
-/// and a doubt for each.
-fn take_pushes_out(recording: &mut Recording, seed: u64, progress: &Progress) -> Result<(Vec<Pose>, Vec<String>)> {
-    let mut depths = RawDepths::masked(recording);
-    let found = hingecast_prepare::steady(&mut depths, recording.up, seed, progress);
-    let pushes = found.map_err(|e| failure(e, recording))?;
-    if pushes.iter().all(|p| *p == Pose::IDENTITY) {
-        return Ok((Vec::new(), Vec::new()));
-    }
-    let middle = depths.middle()?;
-    let pushed = pushes.iter().enumerate().filter(|(_, p)| **p != Pose::IDENTITY);
-    let doubts = pushed.map(|(state, push)| {
-        let far = (push.apply(middle) - middle).length();
-        let far = if recording.metric { format!("{:.0} mm", 1e3 * far) } else { format!("{far:.3} scene units") };
-        let turn = push.angle().to_degrees();
-        format!(
-            "state {state}: the object as a whole was taken to stand {far} and {turn:.1} deg elsewhere, pushed, and brought \
-             back; if it stood still, leave that state out"
-        )
-    });
-    let doubts = doubts.collect();
-    apply(recording, &pushes);
-    Ok((pushes, doubts))
-}
-
 /// Puts what a run's folder `prepare/` holds into the recording.
 fn restore(recording: &mut Recording, at: &Path) -> Result<Prepared> {
     let path = at.join("prepare.json");
@@ -261,6 +207,8 @@ fn restore(recording: &mut Recording, at: &Path) -> Result<Prepared> {
         Failure::new(format!("not what this program writes: {e}"), path.display().to_string(), "build again")
     })?;
     put_cameras(recording, &prepared.cameras);
+    apply(recording, &prepared.level);
+    recording.settled = prepared.settled;
     if let Some(found) = &prepared.registration {
         apply(recording, &found.common_from_state);
         recording.registered = true;

@@ -57,6 +57,7 @@ pub fn run(inputs: &Inputs, progress: &Progress) -> Result<(Parts, Vec<Labelled>
     let mut config = inputs.config.screw.clone();
     config.film = inputs.recording.film;
     (config.seed, config.skip) = (inputs.config.seed, inputs.config.passes.skip.clone());
+    config.held = inputs.recording.settled;
     let found = find(&mut depths, &config, progress)?;
     Ok((Parts::new(&found, &depths.frames, extent), found.samples, found.trace))
 }

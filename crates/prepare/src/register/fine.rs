@@ -73,19 +73,29 @@ pub(crate) fn step(
 }
 
 /// The poses of all states (frame of state 0 from each), refined together from `start`. `order`: the
-/// states as the pairs reach them, state 0 first.
-pub(super) fn together(scans: &[Scan], start: Vec<Pose>, order: &[usize], seed: u64) -> Vec<Pose> {
+/// states as the pairs reach them, state 0 first. `pair`: where a pair by itself says that a state
+/// stands in the frame of another.
+pub(super) fn together(
+    scans: &[Scan],
+    start: Vec<Pose>,
+    order: &[usize],
+    pair: &dyn Fn(usize, usize) -> Option<Pose>,
+    seed: u64,
+) -> Vec<Pose> {
     let n = scans.len();
     let own: Vec<Cloud> = scans.iter().map(|scan| balanced::pick(&scan.fine, SAMPLES, seed)).collect();
     let voxel = scans.iter().map(|s| s.fine_voxel).fold(0.0, f32::max);
-    let aligned = |s: usize, others: &[usize], poses: &[Pose], rounds: usize| {
+    let gathered = |others: &[usize], poses: &[Pose]| {
         let (mut points, mut normals) = (Vec::new(), Vec::new());
         for &r in others {
             let (p, m) = carried(&scans[r].fine, &poses[r]);
             points.extend(p);
             normals.extend(m);
         }
-        let surface = Surface::new(points, normals);
+        Surface::new(points, normals)
+    };
+    let aligned = |s: usize, others: &[usize], poses: &[Pose], rounds: usize| {
+        let surface = gathered(others, poses);
         let (mut pose, mut scale) = (poses[s], f64::from(voxel));
         for _ in 0..rounds {
             let (better, [_, median]) = step(&own[s].points, &own[s].normals, &surface, pose, 2.0 * voxel, scale);
@@ -98,8 +108,11 @@ pub(super) fn together(scans: &[Scan], start: Vec<Pose>, order: &[usize], seed: 
     // Each onto those before it: two states that lie well on each other would hold each other where
     // both are off.
     for k in 1..order.len() {
-        let before = &order[k.saturating_sub(ALL)..k];
-        poses[order[k]] = aligned(order[k], before, &poses, 12);
+        let (s, before) = (order[k], &order[k.saturating_sub(ALL)..k]);
+        let by_pairs = before.iter().filter_map(|&r| Some(poses[r] * pair(r, s)?));
+        let starts: Vec<Pose> = std::iter::once(poses[s]).chain(by_pairs).collect();
+        poses[s] = most_exact(&scans[s], &own[s], &gathered(before, &poses), &starts, voxel);
+        poses[s] = aligned(s, before, &poses, 12);
     }
     for _ in 0..ROUNDS {
         let next: Vec<Pose> = (0..n)
@@ -117,6 +130,60 @@ pub(super) fn together(scans: &[Scan], start: Vec<Pose>, order: &[usize], seed: 
     }
     poses
 }
+
+/// Of the places that `starts` lead to, the one at which most of a scan lies exactly on `surface`. Where
+/// the object was pushed by no more than a cell or two, what is coarsely best lies between room and
+/// object, and on neither. `facing`: samples of the scan, facings balanced.
+fn most_exact(scan: &Scan, facing: &Cloud, surface: &Surface, starts: &[Pose], voxel: f32) -> Pose {
+    let even = balanced::evenly(&scan.fine, facing.points.len());
+    // The object has many facings, the room most of the surface.
+    let tries: Vec<(&Cloud, Pose)> = starts.iter().flat_map(|start| [(facing, *start), (&even, *start)]).collect();
+    let settled: Vec<(Pose, f64)> = tries
+        .into_par_iter()
+        .map(|(cloud, start)| {
+            let (mut pose, mut scale, mut noise) = (start, WIDE * f64::from(voxel), f64::INFINITY);
+            while scale > NARROW * f64::from(voxel) {
+                let gate = (2.0 * scale as f32).max(2.0 * voxel);
+                let (better, [quartile, _]) = step(&cloud.points, &cloud.normals, surface, pose, gate, scale);
+                (pose, scale, noise) = (better, SLOWLY * scale, 2.0 * quartile);
+                if scale < 3.0 * quartile {
+                    break;
+                }
+            }
+            (pose, noise)
+        })
+        .collect();
+    let noise = settled.iter().map(|s| s.1).fold(f64::INFINITY, f64::min);
+    let within = on(voxel, noise);
+    let lying = |pose: &Pose| {
+        let (points, normals) = carried(&even, pose);
+        points.iter().zip(&normals).filter(|(x, m)| lies_on(surface, **x, **m, voxel, within)).count()
+    };
+    let counted: Vec<usize> = settled.par_iter().map(|s| lying(&s.0)).collect();
+    let best = (0..settled.len()).max_by_key(|&k| (counted[k], std::cmp::Reverse(k)));
+    best.map_or(starts[0], |k| settled[k].0)
+}
+
+/// Whether a sample lies `within` a plane of a surface whose samples are a fine voxel apart, and faces
+/// as it does.
+pub(super) fn lies_on(surface: &Surface, x: Vec3, m: Vec3, voxel: f32, within: f32) -> bool {
+    surface.nearest(x).is_some_and(|(j, squared)| {
+        let n = surface.normals[j];
+        squared < (2.0 * voxel).powi(2) && m.dot(n) > 0.9 && n.dot(x - surface.points[j]).abs() < within
+    })
+}
+
+/// How near a sample must be to a plane to lie on it, where what a scan says is off by `noise`.
+pub(super) fn on(voxel: f32, noise: f64) -> f32 {
+    (ON * voxel).max(if noise.is_finite() { 3.0 * noise as f32 } else { 0.0 })
+}
+
+/// Scales, fine voxels, between which the fit narrows, and by how much a step.
+const WIDE: f64 = 6.0;
+const NARROW: f64 = 0.1;
+const SLOWLY: f64 = 0.75;
+/// Within so many fine voxels of a plane, or three times the noise, a sample lies on it.
+const ON: f32 = 0.25;
 
 /// Other states that a scan is aligned to.
 const ALL: usize = 8;

@@ -8,11 +8,13 @@
 mod apart;
 mod balanced;
 pub(crate) mod fine;
+mod level;
 mod pair;
 mod steady;
 mod votes;
 
 pub use apart::apart;
+pub use level::level;
 pub use steady::steady;
 
 use crate::error::PrepareError;
@@ -95,7 +97,11 @@ pub fn register(
     }
     let Connected { poses, order, used } = connect(n, &pairs, &found)?;
     progress.report(0, 1, "all scans together")?;
-    let common_from_state = fine::together(&scans, poses, &order, seed);
+    let pair = |r: usize, s: usize| {
+        let at = |(a, b): (usize, usize)| pairs.iter().position(|p| *p == (a, b)).map(|k| found[k].pose);
+        at((r, s)).or_else(|| at((s, r)).map(|p| p.inverse()))
+    };
+    let common_from_state = fine::together(&scans, poses, &order, &pair, seed);
     let circle = circle(&pairs, &found, &common_from_state);
     let reports = pairs.iter().zip(&found).zip(used).map(|((&states, f), used)| PairReport {
         states,

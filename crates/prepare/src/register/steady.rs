@@ -29,17 +29,20 @@ const SHIFT: f64 = 0.2;
 /// What is pushed stays on its floor: largest tilt, radians, and rise, shares of the longest side.
 const TILT: f64 = 0.03;
 const RISE: f64 = 0.02;
-/// A push is believed when it explains so many times what the recorded place does.
+/// A push is believed when it explains so many times what the place nearest to the recorded one
+/// does.
 const EARNED: f64 = 1.25;
-/// The same for a place that is found from the recorded one.
+/// The same for a push that hardly turns, by this many radians: drawers pulled out together look
+/// like it. What people push turns with it.
+const EARNED_STRAIGHT: f64 = 1.5;
+const STRAIGHT: f64 = 0.026;
+/// The nearest place itself must explain so many times what the recorded one does.
 const EARNED_FINELY: f64 = 1.15;
 /// Of the surface that a push would have moved by so many tolerances along its normals, at most this
-/// share may stand where it stood. Drawers pulled out together look like a cupboard that was pushed,
-/// but its frame has stayed.
+/// share may stand where it stood, and nowhere else: the frame of drawers that were pulled out has
+/// stayed.
 const CLEARLY: f64 = 2.5;
 const STANDS: f64 = 0.05;
-/// Within so many fine voxels of a plane, or three times the noise, a sample lies on it.
-const ON: f32 = 0.25;
 /// Places that are settled finely, and the rounds of that.
 const FINALISTS: usize = 6;
 const ROUNDS: usize = 12;
@@ -145,10 +148,7 @@ fn placed(scan: &Scan, before: &[(&Scan, Pose)], candidates: &[Pose], up: DVec3,
             back.iter().any(|other| ask(other) == Answer::Free)
         };
         let lies = |(x, m): (&Vec3, &Vec3)| {
-            let Some((j, squared)) = surface.nearest(*x) else { return false };
-            let n = surface.normals[j];
-            let off = n.dot(*x - surface.points[j]).abs();
-            squared < (2.0 * voxel).powi(2) && m.dot(n) > 0.9 && off < within && !empty(x.as_dvec3(), m.as_dvec3())
+            fine::lies_on(&surface, *x, *m, voxel, within) && !empty(x.as_dvec3(), m.as_dvec3())
         };
         moved.iter().zip(&turned).map(lies).collect()
     };
@@ -166,8 +166,7 @@ fn placed(scan: &Scan, before: &[(&Scan, Pose)], candidates: &[Pose], up: DVec3,
     };
     let tried: Vec<(Pose, f64)> = std::iter::once(&Pose::IDENTITY).chain(candidates).map(settled).collect();
     let noise = tried.iter().map(|t| t.1).fold(f64::INFINITY, f64::min);
-    let within = (ON * voxel).max(if noise.is_finite() { 3.0 * noise as f32 } else { 0.0 });
-    let recorded = on(&Pose::IDENTITY, within);
+    let within = fine::on(voxel, noise);
     let side = scan.voxel() * scan.space.lattice.size.max_element() as f32;
     let middle = even.points.iter().sum::<Vec3>() / even.points.len().max(1) as f32;
     let stays_down = |pose: &Pose| {
@@ -175,24 +174,34 @@ fn placed(scan: &Scan, before: &[(&Scan, Pose)], candidates: &[Pose], up: DVec3,
         let rise = (pose.apply(middle.as_dvec3()) - middle.as_dvec3()).dot(up);
         tilt < TILT && rise.abs() < RISE * f64::from(side)
     };
-    let upright = tried.iter().enumerate().filter(|(_, (pose, _))| stays_down(pose));
     let count = |on: &[bool]| on.iter().filter(|o| **o).count();
-    let places = upright.map(|(k, (pose, _))| {
-        let earned = if k == 0 { EARNED_FINELY } else { EARNED };
-        (on(pose, within), earned, *pose)
+    let upright = tried.iter().map(|(pose, _)| pose).filter(|pose| stays_down(pose));
+    let best = upright.map(|pose| (on(pose, within), *pose)).max_by_key(|(on, _)| count(on));
+    let Some((best_on, best)) = best.filter(|(on, _)| count(on) >= FEW) else { return Pose::IDENTITY };
+    // What stands still has drifted a little at most: a push must beat the place that is found from
+    // the recorded one, too.
+    let near = tried[0].0;
+    let found_near = farthest(&best, &near, &even.points) < CLEARLY * f64::from(within);
+    let enough = match found_near {
+        true => EARNED_FINELY,
+        false if best.angle() < STRAIGHT => EARNED_STRAIGHT,
+        false => EARNED,
+    };
+    let (mut stood, mut stood_on) = (Pose::IDENTITY, on(&Pose::IDENTITY, within));
+    if !found_near {
+        let near_on = on(&near, within);
+        if count(&near_on) > count(&stood_on) {
+            (stood, stood_on) = (near, near_on);
+        }
+    }
+    let earned = count(&best_on) as f64 / count(&stood_on).max(1) as f64;
+    // What a push would have carried off, and how much of it stands where it stood.
+    let carried_off = (0..best_on.len()).filter(|&i| {
+        let (x, n) = (even.points[i].as_dvec3(), even.normals[i].as_dvec3());
+        (best.apply(x) - stood.apply(x)).dot(n).abs() > CLEARLY * f64::from(within)
     });
-    let best = places.max_by_key(|(on, _, _)| count(on));
-    let believed = best.filter(|(on, earned, pose)| {
-        // What a push would have carried off: does it stand where it stood?
-        let carried_off = (0..on.len()).filter(|&i| {
-            let (x, n) = (even.points[i].as_dvec3(), even.normals[i].as_dvec3());
-            (pose.apply(x) - x).dot(n).abs() > CLEARLY * f64::from(within)
-        });
-        let (all, stands) = carried_off.fold((0, 0), |(all, stands), i| (all + 1, stands + usize::from(recorded[i])));
-        count(on) >= FEW
-            && count(on) as f64 > earned * count(&recorded) as f64
-            && all >= FEW / 2
-            && (stands as f64) < STANDS * all as f64
-    });
-    believed.map_or(Pose::IDENTITY, |(_, _, pose)| pose)
+    let (all, stands) = carried_off
+        .fold((0usize, 0usize), |(all, stands), i| (all + 1, stands + usize::from(stood_on[i] && !best_on[i])));
+    let believed = earned > enough && all >= FEW / 2 && (stands as f64) < STANDS * all as f64;
+    if believed { best } else { Pose::IDENTITY }
 }

@@ -89,6 +89,22 @@ pub fn chest(out: f64, push: Pose) -> Vec<Block> {
     moved(case.into_iter().chain(drawer), push)
 }
 
+/// A rack of bars that face all ways, with a flap of two bars that hangs at `deg`; the whole of it moved by
+/// `push` (about its own middle). It has more facings than the room around it.
+pub fn rack(deg: f64, push: Pose) -> Vec<Block> {
+    let bar = |k: usize| {
+        let turn = 25.0 * k as f64;
+        let at = DQuat::from_rotation_z(turn.to_radians()) * DVec3::new(0.28, 0.0, 0.0);
+        block([0.1 + at.x, 0.65 + at.y, 0.35], [0.03, 0.04, 0.7], turn)
+    };
+    let flap = |z: f64| {
+        let hinge = Pose::new(DQuat::from_rotation_x(-deg.to_radians()), DVec3::new(0.1, 0.4, 0.7));
+        let world_from_block = hinge * Pose::from_trans(DVec3::new(0.0, 0.0, -z));
+        Block { half: DVec3::new(0.2, 0.015, 0.03), world_from_block }
+    };
+    moved((0..14).map(bar).chain([block([0.1, 0.65, 0.35], [0.6, 0.6, 0.03], 0.0), flap(0.1), flap(0.25)]), push)
+}
+
 /// What a camera sees: z, 0 where nothing is; and which block, from 1.
 pub fn picture(camera: &Camera, blocks: &[Block]) -> (Vec<f32>, Vec<u8>) {
     let (w, h) = (camera.width, camera.height);
