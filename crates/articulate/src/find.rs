@@ -163,6 +163,10 @@ pub fn find(depths: &mut dyn Depths, config: &Config, progress: &Progress) -> Re
         labels = label_clouds(&evidence, &estimate.tree, &estimate.owners);
         said = shown(&evidence, &estimate.tree, &labels, &witnesses);
     }
+    if value_by_views::leave_out(&evidence, &mut estimate, &said, seed) {
+        labels = label_clouds(&evidence, &estimate.tree, &estimate.owners);
+        said = shown(&evidence, &estimate.tree, &labels, &witnesses);
+    }
     let information = if noisy { of_parts(&evidence, &labels, &estimate) } else { Vec::new() };
     let resampled = match noisy && config.resample && !estimate.tree.joints.is_empty() {
         true => resample::deviations(depths, lattice, &cameras, &estimate, seed, progress)?,

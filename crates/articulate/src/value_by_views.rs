@@ -6,6 +6,7 @@
 //! where it would be in the others, is seen there or looked through.
 
 use crate::model::estimate::Estimate;
+use crate::model::tree_edit::{leaves, without};
 use crate::observe::evidence::Evidence;
 use crate::observe::sample::Motion;
 use crate::observe::witness::{Witness, counted};
@@ -62,6 +63,27 @@ pub fn correct(
         relabel(&round, estimate);
     }
     changed
+}
+
+/// Takes out parts that never left where they are said to have been at rest (see [`Shown::never_left`]); fits and
+/// labels follow. Whether there were any.
+pub fn leave_out(evidence: &Evidence, estimate: &mut Estimate, shown: &[Shown], seed: u64) -> bool {
+    let tree = &estimate.tree;
+    let stayed = |part: &usize| (0..shown.len()).any(|j| tree.joints[j].child == *part && shown[j].never_left());
+    let phantoms: Vec<usize> = leaves(tree).filter(stayed).collect();
+    for &part in phantoms.iter().rev() {
+        estimate.tree = without(&estimate.tree, part);
+        estimate.verdicts.remove(part);
+        estimate.owners.shown.remove(part);
+    }
+    if !phantoms.is_empty() {
+        let round = Round { evidence, seed, number: 1 };
+        relabel(&round, estimate);
+        label_by_verdicts(&round, estimate);
+        refine_all(&round, estimate, GATE_VOXELS);
+        relabel(&round, estimate);
+    }
+    !phantoms.is_empty()
 }
 
 /// The value of joint `at.0` in state `at.1` that views bear out clearly better than the one held.
