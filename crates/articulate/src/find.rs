@@ -98,6 +98,7 @@ pub fn find(depths: &mut dyn Depths, config: &Config, progress: &Progress) -> Re
         _ => &[],
     };
     let skip: Vec<String> = config.skip.iter().cloned().chain(not.iter().map(|s| s.to_string())).collect();
+    let tether = |usual: f64| if config.held { HELD } else { usual };
     let mut cameras: Vec<Vec<Pose>> = Vec::new();
     let mut evidence = Evidence::gather::<ArticulateError>(
         n_states,
@@ -107,8 +108,7 @@ pub fn find(depths: &mut dyn Depths, config: &Config, progress: &Progress) -> Re
             let mut views = depths.views(state).map_err(ArticulateError::of_depths)?;
             check_views(&views, state)?;
             if config.align_cameras {
-                let tether = if config.held { HELD } else { cameras::TETHER };
-                cameras::align(&mut views, lattice.voxel, cameras::POINTS, tether);
+                cameras::align(&mut views, lattice.voxel, cameras::POINTS, tether(cameras::TETHER));
             }
             cameras.push(views.iter().map(|v| v.camera.camera_from_world).collect());
             Ok(views)
@@ -133,7 +133,7 @@ pub fn find(depths: &mut dyn Depths, config: &Config, progress: &Progress) -> Re
             &mut |state| {
                 progress.report(state, n_states, "views of what stands still")?;
                 let mut views = corrected(depths, state, &cameras[state])?;
-                let tether = if config.held { HELD } else { align_to_base::TETHER };
+                let tether = tether(align_to_base::TETHER);
                 align_to_base::align(&mut views, &before, state, &labels[state], &base, tether);
                 cameras[state] = views.iter().map(|v| v.camera.camera_from_world).collect();
                 Ok(views)

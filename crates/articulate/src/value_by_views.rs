@@ -6,11 +6,11 @@
 //! where it would be in the others, is seen there or looked through.
 
 use crate::model::estimate::Estimate;
-use crate::model::tree_edit::{leaves, without};
+use crate::model::tree_edit::leaves;
 use crate::observe::evidence::Evidence;
 use crate::observe::sample::Motion;
 use crate::observe::witness::{Witness, counted};
-use crate::passes::pass::{Round, label_by_verdicts, prune_parts, relabel};
+use crate::passes::pass::{Round, label_by_verdicts, prune_parts, relabel, take_out};
 use crate::passes::refine_joints::refine_all;
 use crate::shown::{Shown, mean, slack, some_points};
 use glam::Vec3;
@@ -72,14 +72,11 @@ pub fn leave_out(evidence: &Evidence, estimate: &mut Estimate, shown: &[Shown], 
     let stayed = |part: &usize| (0..shown.len()).any(|j| tree.joints[j].child == *part && shown[j].never_left());
     let phantoms: Vec<usize> = leaves(tree).filter(stayed).collect();
     for &part in phantoms.iter().rev() {
-        estimate.tree = without(&estimate.tree, part);
-        estimate.verdicts.remove(part);
-        estimate.owners.shown.remove(part);
+        take_out(estimate, part);
     }
     if !phantoms.is_empty() {
         let round = Round { evidence, seed, number: 1 };
         relabel(&round, estimate);
-        label_by_verdicts(&round, estimate);
         refine_all(&round, estimate, GATE_VOXELS);
         relabel(&round, estimate);
     }

@@ -5,7 +5,7 @@ use glam::Vec3;
 use hingecast_articulate::observe::cloud::{Cloud, gather};
 use hingecast_articulate::observe::lattice::Lattice;
 use hingecast_articulate::observe::occupancy::{Answer, Occupancy};
-use hingecast_articulate::{DepthView, OBJECT};
+use hingecast_articulate::{DepthView, OBJECT, OTHER, UNKNOWN};
 
 /// Cells along the longest side of a scan, coarse and fine.
 const COARSE: usize = 96;
@@ -60,6 +60,12 @@ impl Scan {
             None => Answer::Silent,
         }
     }
+}
+
+/// The same views with all that has depth as `OBJECT`, whatever a mask says.
+pub(crate) fn everything(views: &[DepthView]) -> Vec<DepthView> {
+    let seen = |class: &u8| if matches!(*class, OBJECT | OTHER) { OBJECT } else { UNKNOWN };
+    views.iter().map(|v| DepthView { class: v.class.iter().map(seen).collect(), ..v.clone() }).collect()
 }
 
 /// The samples of a cloud at these places.

@@ -2,9 +2,9 @@
 //! clutter hold a camera far better than the object alone does.
 
 use crate::error::PrepareError;
-use crate::scan::extent;
+use crate::scan::{everything, extent};
 use hingecast_articulate::observe::cameras;
-use hingecast_articulate::{DepthView, Depths};
+use hingecast_articulate::{DepthView, Depths, OTHER};
 use hingecast_geom::{Pose, Progress};
 
 /// Cells along the longest side of a scan in which its views are compared.
@@ -27,46 +27,45 @@ pub struct Settled {
     pub held: bool,
 }
 
-/// Settles the cameras of each scan. Views' pixels of class `OBJECT` of `all` are everything that was seen, of
-/// `object` the object alone, if there are masks: a state in which it agrees less with itself afterwards
-/// stays as it was recorded. What is around a turntable holds no camera.
+/// Settles the cameras of each scan on its pixels of class `OBJECT` and `OTHER`. Where there are `OTHER`s, a
+/// state in which the `OBJECT` agrees less with itself afterwards stays as it was recorded: what is around a
+/// turntable holds no camera.
 ///
 /// # Errors
 /// A view that cannot be read, the wish to stop.
-pub fn settle(
-    all: &mut dyn Depths,
-    mut object: Option<&mut dyn Depths>,
-    progress: &Progress,
-) -> Result<Settled, PrepareError> {
-    let n = all.n_states();
+pub fn settle(depths: &mut dyn Depths, progress: &Progress) -> Result<Settled, PrepareError> {
+    let n = depths.n_states();
     let mut out = Settled { cameras: Vec::new(), held: true };
     for state in 0..n {
         progress.report(state, n, "views of each scan")?;
-        let mut views = all.views(state)?;
-        let recorded = poses(&views);
-        if let Some((lo, hi)) = extent(&views, 0.0) {
-            cameras::align(&mut views, (hi - lo).max_element() / CELLS, POINTS, cameras::TETHER);
+        let mut object = depths.views(state)?;
+        let recorded = poses(&object);
+        let mut views = everything(&object);
+        if let Some(voxel) = voxel(&views) {
+            cameras::align(&mut views, voxel, POINTS, cameras::TETHER);
         }
         let mut settled = poses(&views);
-        if let Some((lo, hi)) = extent(&views, 0.0) {
-            let share = cameras::agreement(&views, (hi - lo).max_element() / CELLS, POINTS);
-            out.held &= share > STANDS_STILL;
+        if let Some(voxel) = voxel(&views) {
+            out.held &= cameras::agreement(&views, voxel, POINTS) > STANDS_STILL;
         }
-        if let Some(object) = object.as_deref_mut().filter(|_| settled != recorded) {
-            let mut views = object.views(state)?;
-            if let Some((lo, hi)) = extent(&views, 0.0) {
-                let mut off = |cameras: &[Pose]| {
-                    views.iter_mut().zip(cameras).for_each(|(v, c)| v.camera.camera_from_world = *c);
-                    cameras::disagreement(&views, (hi - lo).max_element() / CELLS, cameras::POINTS)
-                };
-                if off(&settled) > WORSE * off(&recorded) {
-                    (settled, out.held) = (recorded, false);
-                }
+        let masked = object.iter().any(|v| v.class.contains(&OTHER));
+        if let Some(voxel) = voxel(&object).filter(|_| masked && settled != recorded) {
+            let mut off = |cameras: &[Pose]| {
+                object.iter_mut().zip(cameras).for_each(|(v, c)| v.camera.camera_from_world = *c);
+                cameras::disagreement(&object, voxel, cameras::POINTS)
+            };
+            if off(&settled) > WORSE * off(&recorded) {
+                (settled, out.held) = (recorded, false);
             }
         }
         out.cameras.push(settled);
     }
     Ok(out)
+}
+
+/// Edge of the cells in which views are compared, scene units.
+fn voxel(views: &[DepthView]) -> Option<f32> {
+    extent(views, 0.0).map(|(lo, hi)| (hi - lo).max_element() / CELLS)
 }
 
 fn poses(views: &[DepthView]) -> Vec<Pose> {

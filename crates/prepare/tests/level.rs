@@ -17,8 +17,8 @@ fn small(rng: &mut fastrand::Rng, deg: f64, mm: f64) -> Pose {
     Pose::from_trans(middle) * turn * Pose::from_trans(-middle)
 }
 
-/// A view of a thing in a room, with the pose that tracking said: everything, and the thing alone.
-fn view(camera: Camera, thing: &[Block], room: &[Block], said: Pose) -> (DepthView, DepthView) {
+/// A view of a thing in a room, with the pose that tracking said.
+fn view(camera: Camera, thing: &[Block], room: &[Block], said: Pose) -> DepthView {
     let (depth, which) = picture(&camera, &[room, thing].concat());
     let camera = Camera { camera_from_world: camera.camera_from_world * said.inverse(), ..camera };
     let masked = |k: &u8| match *k as usize {
@@ -26,39 +26,36 @@ fn view(camera: Camera, thing: &[Block], room: &[Block], said: Pose) -> (DepthVi
         k if k > room.len() => OBJECT,
         _ => OTHER,
     };
-    let seen = depth.iter().map(|z| if *z > 0.0 { OBJECT } else { UNKNOWN });
-    let all = DepthView { class: seen.collect(), camera, depth: depth.clone() };
-    let thing = DepthView { class: which.iter().map(masked).collect(), camera, depth };
-    (all, thing)
+    DepthView { class: which.iter().map(masked).collect(), camera, depth }
 }
 
 type States = Vec<Vec<DepthView>>;
 
 /// Four states of a cupboard; `said(state, view)`: the world that tracking had, from the true one.
-fn states(said: &mut dyn FnMut(usize, usize) -> Pose, room: &dyn Fn(usize) -> Vec<Block>) -> (States, States) {
+fn states(said: &mut dyn FnMut(usize, usize) -> Pose, room: &dyn Fn(usize) -> Vec<Block>) -> States {
     (0..4)
         .map(|k| {
             let thing = cupboard(25.0 * k as f64, Pose::IDENTITY);
             let views = cameras(12, k as u64).into_iter().enumerate();
-            views.map(|(v, camera)| view(camera, &thing, &room(v), said(k, v))).unzip()
+            views.map(|(v, camera)| view(camera, &thing, &room(v), said(k, v))).collect()
         })
-        .unzip()
+        .collect()
 }
 
 #[test]
 fn what_scans_drifted_from_each_other_is_taken_out() {
     let mut rng = fastrand::Rng::with_seed(3);
     let offset: Vec<Pose> = (0..4).map(|k| if k == 0 { Pose::IDENTITY } else { small(&mut rng, 0.5, 5.0) }).collect();
-    let (mut all, mut thing) = states(&mut |k, _| offset[k], &|_| room());
-    let found = level(&mut all, &mut thing, 0, &Progress::default()).unwrap().unwrap();
+    let mut scans = states(&mut |k, _| offset[k], &|_| room());
+    let found = level(&mut scans, 0, &Progress::default()).unwrap().unwrap();
     for (k, (found, said)) in found.iter().zip(&offset).enumerate() {
         let off = *found * *said;
         println!("state {k}: {:.4} deg {:.5} m", off.angle().to_degrees(), off.trans.length());
         assert!(off.angle().to_degrees() < 0.05 && off.trans.length() < 1e-3);
     }
     // Nothing to do where nothing drifted.
-    let (mut all, mut thing) = states(&mut |_, _| Pose::IDENTITY, &|_| room());
-    assert!(level(&mut all, &mut thing, 0, &Progress::default()).unwrap().unwrap().is_empty());
+    let mut scans = states(&mut |_, _| Pose::IDENTITY, &|_| room());
+    assert!(level(&mut scans, 0, &Progress::default()).unwrap().unwrap().is_empty());
 }
 
 #[test]
@@ -71,9 +68,9 @@ fn cameras_settle_on_the_room_and_a_turntable_is_none() {
             pairs.map(|(a, b)| (a.inverse() * b.camera.camera_from_world).angle().to_degrees()).collect();
         off.iter().sum::<f64>() / off.len() as f64
     };
-    let truth = states(&mut |_, _| Pose::IDENTITY, &|_| room()).0;
-    let (mut all, mut thing) = states(&mut |k, v| drift[12 * k + v], &|_| room());
-    let settled = settle(&mut all, Some(&mut thing), &Progress::default()).unwrap();
+    let truth = states(&mut |_, _| Pose::IDENTITY, &|_| room());
+    let mut scans = states(&mut |k, v| drift[12 * k + v], &|_| room());
+    let settled = settle(&mut scans, &Progress::default()).unwrap();
     let off = error(&settled, &truth);
     println!("{off:.3} deg, held: {}", settled.held);
     // What the views of a state have in common stays.
@@ -83,9 +80,9 @@ fn cameras_settle_on_the_room_and_a_turntable_is_none() {
         let turn = common::pushed(Pose::new(DQuat::from_rotation_z(0.5 * v as f64), DVec3::ZERO));
         room().into_iter().map(|b| Block { world_from_block: turn * b.world_from_block, ..b }).collect()
     };
-    let (mut all, mut thing) = states(&mut |k, v| drift[12 * k + v], &turned);
-    let recorded = Settled { cameras: poses(&all), held: true };
-    let settled = settle(&mut all, Some(&mut thing), &Progress::default()).unwrap();
+    let mut scans = states(&mut |k, v| drift[12 * k + v], &turned);
+    let recorded = Settled { cameras: poses(&scans), held: true };
+    let settled = settle(&mut scans, &Progress::default()).unwrap();
     let (before, off) = (error(&recorded, &truth), error(&settled, &truth));
     println!("turntable: {before:.3} deg, then {off:.3}, held: {}", settled.held);
     assert!(!settled.held && off < 1.05 * before, "{off} deg, {before} before");

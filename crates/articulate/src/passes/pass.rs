@@ -49,8 +49,8 @@ pub fn label_by_verdicts(round: &Round, estimate: &mut Estimate) {
 /// Drops parts that the others make superfluous: those without children that explain less than they
 /// cost. The verdicts follow.
 pub fn prune_parts(estimate: &mut Estimate) {
-    let Estimate { tree, verdicts, cost, owners, .. } = estimate;
     loop {
+        let Estimate { tree, verdicts, cost, .. } = &*estimate;
         let left = |without: usize| -> f64 {
             let some: Vec<_> = (0..verdicts.len()).filter(|p| *p != without).map(|p| &verdicts[p][..]).collect();
             (0..some[0].len()).map(|i| contradictions(&some, i)).sum()
@@ -63,8 +63,13 @@ pub fn prune_parts(estimate: &mut Estimate) {
         };
         let weakest = leaves(tree).map(|p| (gain(p), p)).min_by(|a, b| a.0.total_cmp(&b.0));
         let Some((_, part)) = weakest.filter(|w| w.0 < 0.0) else { return };
-        *tree = without(tree, part);
-        verdicts.remove(part);
-        owners.shown.remove(part);
+        take_out(estimate, part);
     }
+}
+
+/// The estimate without a part that carries no other. Labels are for who calls to make anew.
+pub fn take_out(estimate: &mut Estimate, part: usize) {
+    estimate.tree = without(&estimate.tree, part);
+    estimate.verdicts.remove(part);
+    estimate.owners.shown.remove(part);
 }

@@ -3,7 +3,6 @@
 use super::raw_depths::RawDepths;
 use super::words::failure;
 use crate::failure::Result;
-use hingecast_articulate::Depths;
 use hingecast_capture::{Recording, Split};
 use hingecast_geom::{Pose, Progress};
 use hingecast_prepare::register::Freedom;
@@ -11,15 +10,14 @@ use hingecast_prepare::{PrepareError, Registration, Settled};
 use std::collections::BTreeMap;
 
 /// Corrects cameras that drifted along a scan, in a recording that shows a room; `masks`: what of it is
-/// the object is known. Answers all of them (see [`Prepared::cameras`](super::Prepared::cameras)), or nothing when none moved, and
-/// whether the room holds them.
+/// the object is known. Answers all of them (see [`Prepared::cameras`](super::Prepared::cameras)), or
+/// nothing when none moved, and whether the room holds them.
 ///
 /// # Errors
 /// A picture that cannot be read; the wish to stop.
 pub fn settle(recording: &mut Recording, masks: bool, progress: &Progress) -> Result<(Vec<Pose>, bool)> {
-    let mut object = masks.then(|| RawDepths::all_masked(recording));
-    let object = object.as_mut().map(|o| o as &mut dyn Depths);
-    let settled = hingecast_prepare::settle(&mut RawDepths::new(recording), object, progress);
+    let mut depths = if masks { RawDepths::all_masked(recording) } else { RawDepths::new(recording) };
+    let settled = hingecast_prepare::settle(&mut depths, progress);
     let Settled { cameras, held } = settled.map_err(|e| failure(e, recording))?;
     let frames = (0..cameras.len()).flat_map(|state| recording.frames_of(state, Split::Train));
     let by_frame: BTreeMap<usize, Pose> = frames.zip(cameras.into_iter().flatten()).collect();
@@ -34,8 +32,7 @@ pub fn settle(recording: &mut Recording, masks: bool, progress: &Progress) -> Re
 /// Takes out what the scans of a masked recording in one frame have drifted from each other (see
 /// [`Prepared::level`](super::Prepared::level)). Answers that, and whether the room holds the states.
 pub(super) fn level(recording: &mut Recording, seed: u64, progress: &Progress) -> Result<(Vec<Pose>, bool)> {
-    let (mut all, mut object) = (RawDepths::new(recording), RawDepths::all_masked(recording));
-    let found = hingecast_prepare::level(&mut all, &mut object, seed, progress);
+    let found = hingecast_prepare::level(&mut RawDepths::all_masked(recording), seed, progress);
     let found = found.map_err(|e| failure(e, recording))?;
     let held = found.is_some();
     let level = found.unwrap_or_default();

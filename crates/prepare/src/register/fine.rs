@@ -85,15 +85,7 @@ pub(super) fn together(
     let n = scans.len();
     let own: Vec<Cloud> = scans.iter().map(|scan| balanced::pick(&scan.fine, SAMPLES, seed)).collect();
     let voxel = scans.iter().map(|s| s.fine_voxel).fold(0.0, f32::max);
-    let gathered = |others: &[usize], poses: &[Pose]| {
-        let (mut points, mut normals) = (Vec::new(), Vec::new());
-        for &r in others {
-            let (p, m) = carried(&scans[r].fine, &poses[r]);
-            points.extend(p);
-            normals.extend(m);
-        }
-        Surface::new(points, normals)
-    };
+    let gathered = |others: &[usize], poses: &[Pose]| surface(others.iter().map(|&r| (&scans[r], poses[r])));
     let aligned = |s: usize, others: &[usize], poses: &[Pose], rounds: usize| {
         let surface = gathered(others, poses);
         let (mut pose, mut scale) = (poses[s], f64::from(voxel));
@@ -187,6 +179,17 @@ const ON: f32 = 0.25;
 
 /// Other states that a scan is aligned to.
 const ALL: usize = 8;
+
+/// What scans saw, each brought to where it stands, as one surface.
+pub(super) fn surface<'a>(placed: impl Iterator<Item = (&'a Scan, Pose)>) -> Surface {
+    let (mut points, mut normals) = (Vec::new(), Vec::new());
+    for (scan, pose) in placed {
+        let (p, m) = carried(&scan.fine, &pose);
+        points.extend(p);
+        normals.extend(m);
+    }
+    Surface::new(points, normals)
+}
 
 /// A cloud in another frame.
 pub(super) fn carried(cloud: &Cloud, pose: &Pose) -> (Vec<Vec3>, Vec<Vec3>) {

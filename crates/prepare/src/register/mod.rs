@@ -20,7 +20,7 @@ pub use steady::steady;
 use crate::error::PrepareError;
 use crate::scan::Scan;
 use glam::DVec3;
-use hingecast_articulate::Depths;
+use hingecast_articulate::{DepthView, Depths};
 use hingecast_geom::{Pose, Progress};
 use serde::{Deserialize, Serialize};
 
@@ -114,7 +114,12 @@ pub fn register(
 
 /// A state's scan.
 fn scan(depths: &mut dyn Depths, state: usize) -> Result<Scan, PrepareError> {
-    let scan = Scan::new(&depths.views(state)?, AROUND);
+    scan_of(&depths.views(state)?, state)
+}
+
+/// The scan of a state's views.
+fn scan_of(views: &[DepthView], state: usize) -> Result<Scan, PrepareError> {
+    let scan = Scan::new(views, AROUND);
     let samples = scan.as_ref().map_or(0, |s| s.coarse.points.len());
     scan.filter(|_| samples >= FEW).ok_or(PrepareError::Empty { state, samples })
 }

@@ -130,13 +130,7 @@ fn candidates(scan: &Scan, before: &[(&Scan, Pose)], known: &[Pose], up: DVec3, 
 /// The place at which most samples lie exactly on those of the states before; the recorded one unless
 /// another is clearly better.
 fn placed(scan: &Scan, before: &[(&Scan, Pose)], candidates: &[Pose], up: DVec3, seed: u64) -> Pose {
-    let (mut points, mut normals) = (Vec::new(), Vec::new());
-    for (other, pose) in before {
-        let (p, n) = fine::carried(&other.fine, pose);
-        points.extend(p);
-        normals.extend(n);
-    }
-    let surface = Surface::new(points, normals);
+    let surface = fine::surface(before.iter().copied());
     let voxel = scan.fine_voxel;
     let (even, facing) = (balanced::evenly(&scan.fine, SAMPLES), balanced::pick(&scan.fine, SAMPLES, seed));
     let back: Vec<(&Scan, Pose)> = before.iter().map(|(other, pose)| (*other, pose.inverse())).collect();
