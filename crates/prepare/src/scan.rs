@@ -43,7 +43,7 @@ impl Scan {
         };
         let fine = inside(gather(views, fine_voxel, stride, 1));
         let coarse = inside(gather(views, lattice.voxel, stride, 2));
-        let space = Occupancy::new(lattice, &coarse, views, 1.5);
+        let space = Occupancy::new(lattice, &coarse, views, 1.5, 1);
         Some(Self { coarse, fine, space, fine_voxel })
     }
 

@@ -3,6 +3,7 @@
 use super::cloud::gather;
 use super::depth_view::DepthView;
 use super::lattice::Lattice;
+use super::mask_votes;
 use super::occupancy::Occupancy;
 use super::robust::deviation;
 use super::sample::{Motion, Sample};
@@ -21,6 +22,11 @@ const OF_SCAN: usize = 16_000;
 /// Neighbours that must mostly agree before a contradiction counts.
 const NEIGHBOURS: usize = 8;
 
+/// Share of a state's samples on each side that are no part of its box.
+const STRAY: f32 = 0.001;
+/// A grid is made anew where its voxels become so much smaller, share of what they were.
+const MUCH_FINER: f32 = 0.9;
+
 /// Surfaces face the same way where the cosine between their normals is at least this: 32 deg.
 const FACES_ALIKE: f32 = 0.85;
 /// The nearest sample of a surface at a place is at most this many voxels away: samples are a voxel
@@ -37,6 +43,10 @@ pub struct Evidence {
     pub clouds: Vec<Surface>,
     /// Surface, empty space and the unseen of each state.
     pub spaces: Vec<Occupancy>,
+    /// Pixels that look like background and are none, see [`mask_votes`]. `[state][view]`
+    pub silent: Vec<Vec<Vec<u32>>>,
+    /// Masks held what is not the object.
+    pub too_much: bool,
     /// A subset of all clouds, state after state.
     pub samples: Vec<Sample>,
     /// Nearest samples of the same state. `[sample][NEIGHBOURS]`
@@ -57,16 +67,21 @@ impl Evidence {
         states: &mut dyn FnMut(usize) -> Result<Vec<DepthView>, E>,
         seed: u64,
     ) -> Result<Self, E> {
-        let (mut clouds, mut spaces) = (Vec::new(), Vec::new());
+        let (mut clouds, mut spaces, mut silent) = (Vec::new(), Vec::new(), Vec::new());
+        let mut too_much = false;
         for state in 0..n_states {
-            let views = states(state)?;
+            let mut views = states(state)?;
             let least = if views.len() >= 8 { 2 } else { 1 };
-            let cloud = gather(&views, lattice.voxel, 1, least);
-            spaces.push(Occupancy::new(lattice, &cloud, &views, 1.5));
+            let mut cloud = gather(&views, lattice.voxel, 1, least);
+            let votes = mask_votes::vote(&mut cloud, &mut views, lattice.voxel);
+            too_much |= votes.too_much;
+            silent.push(votes.silent);
+            spaces.push(Occupancy::new(lattice, &cloud, &views, 1.5, votes.least));
             clouds.push(Surface::new(cloud.points, cloud.normals));
         }
         let (samples, neighbours, tolerance) = (Vec::new(), Vec::new(), 0.2 * lattice.voxel);
-        let mut evidence = Self { lattice, clouds, spaces, samples, neighbours, film: false, tolerance };
+        let film = false;
+        let mut evidence = Self { lattice, clouds, spaces, silent, too_much, samples, neighbours, film, tolerance };
         evidence.draw(seed);
         evidence.tolerance = evidence.tolerance.max(4.0 * evidence.noise());
         Ok(evidence)
@@ -104,6 +119,24 @@ impl Evidence {
     /// Longest side of the space that the object takes in all states, scene units.
     pub fn extent(&self) -> f32 {
         (self.lattice.size.as_vec3() * self.lattice.voxel).max_element()
+    }
+
+    /// The grid that the surface would have, `cells` along its longest side, if that is much finer: masks
+    /// with a piece of the wall make a large box.
+    pub fn finer_lattice(&self, cells: usize) -> Option<Lattice> {
+        let (mut lo, mut hi) = (Vec3::INFINITY, Vec3::NEG_INFINITY);
+        for cloud in self.clouds.iter().filter(|c| !c.points.is_empty()) {
+            for a in 0..3 {
+                let mut axis: Vec<f32> = cloud.points.iter().map(|x| x[a]).collect();
+                let stray = (STRAY * axis.len() as f32) as usize;
+                let last = axis.len() - 1 - stray;
+                lo[a] = lo[a].min(*axis.select_nth_unstable_by(stray, f32::total_cmp).1);
+                hi[a] = hi[a].max(*axis.select_nth_unstable_by(last, f32::total_cmp).1);
+            }
+        }
+        let side = (hi - lo).max_element();
+        let finer = self.too_much && side > 0.0 && side < MUCH_FINER * cells as f32 * self.lattice.voxel;
+        finer.then(|| Lattice::new(lo, hi, cells))
     }
 
     /// Number of states.

@@ -7,6 +7,7 @@ pub mod cloud;
 pub mod depth_view;
 pub mod evidence;
 pub mod lattice;
+pub mod mask_votes;
 pub mod occupancy;
 pub mod robust;
 pub mod sample;

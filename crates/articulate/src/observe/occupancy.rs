@@ -51,8 +51,9 @@ fn facing_mask(n: Vec3) -> u32 {
 }
 
 impl Occupancy {
-    /// `cloud` marks surface within `reach` voxels of its samples; `views` carve free space.
-    pub fn new(lattice: Lattice, cloud: &Cloud, views: &[DepthView], reach: f32) -> Self {
+    /// `cloud` marks surface within `reach` voxels of its samples; `views` carve free space where at least
+    /// `least` of them look through.
+    pub fn new(lattice: Lattice, cloud: &Cloud, views: &[DepthView], reach: f32, least: u32) -> Self {
         let mut cells = vec![0u32; lattice.len()];
         let radius = reach.ceil() as i32;
         // Cells that are too near to a surface to be called free.
@@ -73,7 +74,7 @@ impl Occupancy {
             }
         }
         let carvers: Vec<Carver> = views.par_iter().map(|v| Carver::new(v, 0.5 * lattice.voxel)).collect();
-        let needed = ((0.06 * views.len() as f32).round() as u32).max(1);
+        let needed = ((0.06 * views.len() as f32).round() as u32).max(least);
         let row = lattice.size.x as usize;
         cells.par_chunks_mut(row).enumerate().for_each(|(k, cells)| {
             let (y, z) = (k as i32 % lattice.size.y, k as i32 / lattice.size.y);

@@ -4,6 +4,7 @@ use super::pixels;
 use glam::Vec3;
 use hingecast_articulate::Labelled;
 use hingecast_articulate::label::labelled::far_off_plane;
+use hingecast_articulate::observe::mask_votes::contradicted;
 use hingecast_capture::View;
 use hingecast_geom::{PointTree, Pose};
 use hingecast_twin::{BACKGROUND, UNKNOWN};
@@ -73,12 +74,16 @@ pub fn surfaces(labelled: &[Labelled], n_states: usize, state_from_world: &[Pose
 }
 
 /// Part of every pixel of a view: that of the labelled sample of its state which lies nearest in
-/// its plane, if one is within `reach` (squared, scene units).
-pub fn parts_of_pixels(view: &View, surface: &LabelledSurface, reach: f32) -> Vec<u8> {
+/// its plane, if one is within two of `voxel`, scene units: how far apart samples lie.
+pub fn parts_of_pixels(view: &View, surface: &LabelledSurface, voxel: f32) -> Vec<u8> {
+    let reach = (2.0 * voxel).powi(2);
     let silent = |i: usize| {
         if view.usable[i] == 1 && view.mask[i] == 0 && !(view.depth[i] > 0.0) { BACKGROUND } else { UNKNOWN }
     };
     let mut out: Vec<u8> = (0..view.mask.len()).map(silent).collect();
+    for i in contradicted(&view.camera, &surface.points, voxel, &|i| out[i] == BACKGROUND) {
+        out[i as usize] = UNKNOWN;
+    }
     pixels::unproject(view, 1, &mut |x, i| {
         if let Some(part) = surface.part_at(x.as_vec3(), pixels::normal(view, i), reach) {
             out[i] = part;

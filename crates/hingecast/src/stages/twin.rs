@@ -35,8 +35,7 @@ pub fn run(
         Some((samples, voxel)) => {
             let moved = splats.placed.as_ref().map_or(&[][..], |p| &p.state_from_world);
             let by_state: Vec<LabelledSurface> = surfaces(samples, recording.n_states, moved);
-            let reach = (2.0 * voxel).powi(2);
-            seen.label(&|view, state| parts_of_pixels(view, &by_state[state], reach))?;
+            seen.label(&|view, state| parts_of_pixels(view, &by_state[state], voxel))?;
         }
         None => label_by_gaussians(inputs, splats, joints, &frames, &mut seen, progress)?,
     }
