@@ -7,7 +7,7 @@ use crate::error::ArticulateError;
 use crate::label::boundaries::sharpen;
 use crate::label::by_evidence::label_clouds;
 use crate::label::labelled::Labelled;
-use crate::model::estimate::{Discovery, FitReport};
+use crate::model::estimate::{Discovery, Estimate, FitReport};
 use crate::observe::depth_view::DepthView;
 use crate::observe::evidence::{Evidence, MOST_STATES};
 use crate::observe::lattice::Lattice;
@@ -167,13 +167,16 @@ pub fn find(depths: &mut dyn Depths, config: &Config, progress: &Progress) -> Re
         (0..n_states).map(of_state).collect::<Result<_, _>>()?
     };
     let mut said = shown(&evidence, &estimate.tree, &labels, &witnesses);
+    let ask = |estimate: &Estimate| {
+        let labels = label_clouds(&evidence, &estimate.tree, &estimate.owners);
+        let said = shown(&evidence, &estimate.tree, &labels, &witnesses);
+        (labels, said)
+    };
     if value_by_views::correct(&evidence, &mut estimate, &labels, &witnesses, &said, seed) {
-        labels = label_clouds(&evidence, &estimate.tree, &estimate.owners);
-        said = shown(&evidence, &estimate.tree, &labels, &witnesses);
+        (labels, said) = ask(&estimate);
     }
     if value_by_views::leave_out(&evidence, &mut estimate, &said, seed) {
-        labels = label_clouds(&evidence, &estimate.tree, &estimate.owners);
-        said = shown(&evidence, &estimate.tree, &labels, &witnesses);
+        (labels, said) = ask(&estimate);
     }
     let information = if noisy { of_parts(&evidence, &labels, &estimate) } else { Vec::new() };
     let resampled = match noisy && config.resample && !estimate.tree.joints.is_empty() {

@@ -3,7 +3,7 @@
 use super::cloud::gather;
 use super::depth_view::DepthView;
 use super::lattice::Lattice;
-use super::mask_votes;
+use super::mask_votes::{self, MANY_VIEWS};
 use super::occupancy::Occupancy;
 use super::robust::deviation;
 use super::sample::{Motion, Sample};
@@ -71,7 +71,7 @@ impl Evidence {
         let mut too_much = false;
         for state in 0..n_states {
             let mut views = states(state)?;
-            let least = if views.len() >= 8 { 2 } else { 1 };
+            let least = if views.len() >= MANY_VIEWS { 2 } else { 1 };
             let mut cloud = gather(&views, lattice.voxel, 1, least);
             let votes = mask_votes::vote(&mut cloud, &mut views, lattice.voxel);
             too_much |= votes.too_much;
@@ -124,6 +124,9 @@ impl Evidence {
     /// The grid that the surface would have, `cells` along its longest side, if that is much finer: masks
     /// with a piece of the wall make a large box.
     pub fn finer_lattice(&self, cells: usize) -> Option<Lattice> {
+        if !self.too_much {
+            return None;
+        }
         let (mut lo, mut hi) = (Vec3::INFINITY, Vec3::NEG_INFINITY);
         for cloud in self.clouds.iter().filter(|c| !c.points.is_empty()) {
             for a in 0..3 {
@@ -135,7 +138,7 @@ impl Evidence {
             }
         }
         let side = (hi - lo).max_element();
-        let finer = self.too_much && side > 0.0 && side < MUCH_FINER * cells as f32 * self.lattice.voxel;
+        let finer = side > 0.0 && side < MUCH_FINER * cells as f32 * self.lattice.voxel;
         finer.then(|| Lattice::new(lo, hi, cells))
     }
 

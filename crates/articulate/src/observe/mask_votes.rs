@@ -20,9 +20,9 @@ const OUTVOTED: u32 = 2;
 const LACKS: f32 = 0.1;
 /// Where so large a share of a state's samples is outvoted, its masks are ragged. Exact ones: 0.0001.
 const RAGGED: f32 = 0.003;
-/// Of so many views with ragged masks two must look through a cell before it is free: one may be wrong.
-/// Of fewer each sees much alone.
-const MANY_VIEWS: usize = 8;
+/// Of so many views two must bear out what could be one's mistake: a sample by its pixels, or an empty
+/// cell where masks are ragged. Of fewer each sees much alone.
+pub(super) const MANY_VIEWS: usize = 8;
 /// Half a sample's square, shares of the distance between samples: squares of neighbours overlap.
 const HALF: f32 = 0.6;
 
@@ -65,10 +65,8 @@ fn drop_outvoted(cloud: &mut Cloud, views: &[DepthView], voxel: f32) {
         no <= OUTVOTED * yes
     };
     let stays: Vec<bool> = cloud.points.par_iter().map(stays).collect();
-    let mut kept = stays.iter();
-    cloud.points.retain(|_| *kept.next().expect("one per point"));
-    let mut kept = stays.iter();
-    cloud.normals.retain(|_| *kept.next().expect("one per point"));
+    let all = cloud.points.iter().zip(&cloud.normals).zip(&stays);
+    (cloud.points, cloud.normals) = all.filter(|(_, stays)| **stays).map(|((x, n), _)| (*x, *n)).unzip();
 }
 
 /// Whether depth `z` at pixel `i` is the object's: measured there or beside it; or no mask is around,
