@@ -3,8 +3,8 @@
 mod common;
 
 use common::{hinged_box, small};
-use hingecast_capture::check::check;
-use hingecast_capture::synth::{Noise, SynthConfig, synth};
+use hingecast_capture::check::{Severity, check};
+use hingecast_capture::synth::{Masks, Noise, Scenery, SynthConfig, World, synth};
 use hingecast_geom::Progress;
 
 /// Notes of the recording, and the findings of its check.
@@ -28,5 +28,21 @@ fn a_hinge_that_hardly_moves_is_named_by_synth_and_by_check() {
         let (notes, findings) = notes_and_findings([0.0, 0.4], noise);
         assert_eq!(notes, Vec::<String>::new());
         assert!(!findings.contains(&"nothing-moves"), "{findings:?}");
+    }
+}
+
+/// In a room without masks, what moves may be too little for a check of few points: that something else
+/// has to say.
+#[test]
+fn without_masks_it_stops_nobody() {
+    for (masks, severity) in [(Masks::True, Severity::Error), (Masks::None, Severity::Warning)] {
+        let dir = tempfile::tempdir().unwrap();
+        let world = World { scene: Scenery::Room, masks, ..World::default() };
+        let ranges = [("hinge".to_string(), [0.0, 0.0])].into();
+        let config = SynthConfig { ranges, world, views: 10, size: 96, ..small() };
+        let report = synth(&hinged_box(dir.path()), &config, &dir.path().join("rec"), &Progress::default()).unwrap();
+        let findings = check(&report.recording, &Progress::default()).unwrap().findings;
+        let said = findings.iter().find(|f| f.code == "nothing-moves").expect("nothing moves");
+        assert_eq!(said.severity, severity);
     }
 }

@@ -108,6 +108,23 @@ pub fn cost(
     Round { evidence, members, slots: &slots, size: 0, gate, partners, seed, round: 0 }.all(tree).cost
 }
 
+/// Normal matrix of joint `j` alone (2 of the axis first), weighted root mean square of the residuals (scene
+/// units) and rows, with the last gate of `settings`; nothing is moved.
+pub fn normal_equations(
+    evidence: &Evidence,
+    tree: &KinematicTree,
+    members: &[Member],
+    j: usize,
+    settings: &Settings,
+    seed: u64,
+) -> (DMatrix<f64>, f64, usize) {
+    let free: Vec<bool> = (0..tree.joints.len()).map(|k| k == j).collect();
+    let (slots, size) = slots(tree, &free, evidence.n_states());
+    let (gate, partners) = (settings.gates[1], settings.partners);
+    let sums = Round { evidence, members, slots: &slots, size, gate, partners, seed, round: 0 }.all(tree);
+    (sums.a, sums.squares.sqrt(), sums.rows)
+}
+
 /// One round's question: the same members meet the same states, however often it is asked.
 struct Round<'a> {
     evidence: &'a Evidence,

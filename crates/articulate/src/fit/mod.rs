@@ -1,6 +1,7 @@
 //! Joints fitted to samples: values by asking all of them, the last digits by Gauss and Newton, and
 //! the rival type of a joint.
 
+pub mod axis_odds;
 pub mod gauss_newton;
 pub mod path;
 pub mod question;

@@ -7,6 +7,7 @@
 
 use super::pass::Round;
 use crate::config::MANY_STATES;
+use crate::fit::axis_odds::nats_against;
 use crate::fit::gauss_newton::{Settings, cost, gauss_newton};
 use crate::model::estimate::Estimate;
 use crate::model::faces::{ASKEW_RAD, along_faces};
@@ -24,6 +25,10 @@ const KNOWN_RAD: f64 = 0.001;
 /// With many states, an axis that is nearly along the faces stays unless along them it explains the
 /// recording better by this many nats.
 const CLEARLY_NATS: f64 = 1.0;
+/// With many states, an axis that speaks against the faces by this many nats is believed: temples of
+/// glasses taper, and their faces are a degree askew of their hinges.
+const CONTRADICTED_NATS: f64 = 2.0;
+
 /// Axes go along their parts' faces, where the recording does not contradict that.
 pub fn align_axes(round: &Round, estimate: &mut Estimate) {
     straighten(round.evidence, &mut estimate.tree, &estimate.owners, round.seed);
@@ -43,6 +48,12 @@ fn straighten(evidence: &Evidence, tree: &mut KinematicTree, owners: &Owners, se
         let Some(axis) = axis.filter(|a| a.angle_between(screw.axis) > KNOWN_RAD) else {
             continue;
         };
+        let worth = bic_of_two_unknowns(own.len());
+        let few_states = evidence.n_states() < MANY_STATES;
+        let most = if few_states { worth } else { CONTRADICTED_NATS };
+        if nats_against(evidence, tree, &own, j, axis, &fit, seed) > most {
+            continue;
+        }
         let free: Vec<bool> = (0..tree.joints.len()).map(|k| k == j).collect();
         let cost = |tree: &KinematicTree| cost(evidence, tree, &own, 0.6 * voxel, 6, seed);
         let mut straight = tree.clone();
@@ -53,8 +64,8 @@ fn straighten(evidence: &Evidence, tree: &mut KinematicTree, owners: &Owners, se
             straight.joints[j].screw.axis = axis;
         }
         let nats = nats_behind(own.len(), cost(&straight), cost(tree));
-        let doubtful = evidence.n_states() < MANY_STATES || axis.angle_between(screw.axis) > ASKEW_RAD;
-        let most = if doubtful { bic_of_two_unknowns(own.len()) } else { -CLEARLY_NATS };
+        let doubtful = few_states || axis.angle_between(screw.axis) > ASKEW_RAD;
+        let most = if doubtful { worth } else { -CLEARLY_NATS };
         if nats < most {
             *tree = straight;
         }
