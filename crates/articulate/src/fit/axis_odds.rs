@@ -10,7 +10,7 @@ use hingecast_geom::KinematicTree;
 use nalgebra::{DMatrix, Vector2};
 
 /// Samples are not better than this, voxels: edges of cells and of pixels shift whole faces.
-const FLOOR: f64 = 0.03;
+const FLOOR: f64 = 0.08;
 
 /// Nats by which `own`, the samples of its part, speak against turning the axis of joint `j` to `axis` while
 /// pivot and values follow: half of d' S d, S the normal matrix of Gauss and Newton without pivot and values
