@@ -71,8 +71,7 @@ class Thing:
         points, faces, colours = self.posed(state)
         points = ((points - self.middle) * self.scale) @ push[:3, :3].T + push[:3, 3]
         own = len(faces)
-        for box in self.room():
-            corners, sides = box
+        for corners, sides in self.room():
             faces = np.vstack([faces, sides + len(points)])
             points = np.vstack([points, corners])
             colours = np.vstack([colours, np.tile([[120, 90, 60]], (len(corners), 1)) + 9 * len(faces) % 60])
@@ -196,20 +195,17 @@ def recorded(folder, out, options):
                 told = camera
             name = f"{state}_{view:02}.png"
             for kind, image in (("rgb", rgb), ("depth", np.round(depth / UNIT).clip(0, 65535).astype(np.uint16)), ("mask", mask.astype(np.uint8) * 255)):
-                (out / "common" / kind).mkdir(parents=True, exist_ok=True)
-                Image.fromarray(image).save(out / "common" / kind / name)
+                file = out / "common" / kind / name
+                file.parent.mkdir(parents=True, exist_ok=True)
+                Image.fromarray(image).save(file)
+                if kind != "mask":
+                    own = out / f"scan_{state}" / kind / name
+                    own.parent.mkdir(parents=True, exist_ok=True)
+                    own.hardlink_to(file)
             files = {"file_path": f"rgb/{name}", "depth_file_path": f"depth/{name}", "depth_unit_scale_factor": UNIT}
             common["frames"].append({**files, "mask_path": f"mask/{name}", "state": state, "transform_matrix": told.tolist()})
-            away = {k: f"../common/{v}" if k != "depth_unit_scale_factor" else v for k, v in files.items()}
-            scan["frames"].append({**away, "transform_matrix": (world @ told).tolist()})
+            scan["frames"].append({**files, "transform_matrix": (world @ told).tolist()})
             truth["cameras"].append(camera.tolist())
-        save(out / f"scan_{state}" / "transforms.json", scan)
-        for frame in scan["frames"]:  # a scan holds its own files
-            for key in ("file_path", "depth_file_path"):
-                here = out / f"scan_{state}" / frame[key].replace("../common/", "")
-                here.parent.mkdir(exist_ok=True)
-                here.hardlink_to(out / "common" / frame[key].replace("../common/", ""))
-                frame[key] = str(here.relative_to(out / f"scan_{state}"))
         save(out / f"scan_{state}" / "transforms.json", scan)
     save(out / "common" / "transforms.json", common)
     save(out / "true.json", truth)

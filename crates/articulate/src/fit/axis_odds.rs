@@ -15,7 +15,7 @@ const FLOOR: f64 = 0.08;
 /// Nats by which `own`, the samples of its part, speak against turning the axis of joint `j` to `axis` while
 /// pivot and values follow: half of d' S d, S the normal matrix of Gauss and Newton without pivot and values
 /// (its Schur complement), d the turn. Unlike a mean cost, what finds no surface under either axis has no say.
-/// 0 where the matrix cannot be inverted: nothing is known.
+/// 0 where the matrix cannot be inverted, and of a joint that does not move: nothing is known.
 pub fn nats_against(
     evidence: &Evidence,
     tree: &KinematicTree,
@@ -26,11 +26,11 @@ pub fn nats_against(
     seed: u64,
 ) -> f64 {
     let (a, rms, rows) = normal_equations(evidence, tree, own, j, settings, seed);
-    let (n, others) = (a.nrows(), a.nrows() - 2);
+    let Some(others) = a.nrows().checked_sub(2) else { return 0.0 };
     let mut rest: DMatrix<f64> = a.view((2, 2), (others, others)).into_owned();
     let least = 1e-9 * a.diagonal().max().max(1e-12);
     (0..others).for_each(|i| rest[(i, i)] += least);
-    let across = a.view((0, 2), (2, n - 2)).into_owned();
+    let across = a.view((0, 2), (2, others)).into_owned();
     let Some(rest) = rest.cholesky() else { return 0.0 };
     let told = a.view((0, 0), (2, 2)) - &across * rest.solve(&across.transpose());
     let [b1, b2] = square(tree.joints[j].screw.axis);

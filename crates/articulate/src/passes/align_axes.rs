@@ -40,6 +40,7 @@ pub fn align_axes(round: &Round, estimate: &mut Estimate) {
 fn straighten(evidence: &Evidence, tree: &mut KinematicTree, owners: &Owners, seed: u64) {
     let voxel = evidence.lattice.voxel as f64;
     let fit = Settings { gates: [1.0 * voxel, 0.6 * voxel], rounds: 4, partners: 6 };
+    let few_states = evidence.n_states() < MANY_STATES;
     for j in 0..tree.joints.len() {
         let (child, screw) = (tree.joints[j].child, tree.joints[j].screw);
         let own = owners.members(evidence, child);
@@ -49,9 +50,8 @@ fn straighten(evidence: &Evidence, tree: &mut KinematicTree, owners: &Owners, se
             continue;
         };
         let worth = bic_of_two_unknowns(own.len());
-        let few_states = evidence.n_states() < MANY_STATES;
-        let most = if few_states { worth } else { CONTRADICTED_NATS };
-        if nats_against(evidence, tree, &own, j, axis, &fit, seed) > most {
+        let objection = if few_states { worth } else { CONTRADICTED_NATS };
+        if nats_against(evidence, tree, &own, j, axis, &fit, seed) > objection {
             continue;
         }
         let free: Vec<bool> = (0..tree.joints.len()).map(|k| k == j).collect();
