@@ -187,6 +187,9 @@ const CASES: &[Case] = &[
             }
         })
     }),
+    ("one_camera_stands_elsewhere", "view-apart", Fixed, |d| {
+        d.json(|v| columns(&mut v["frames"][2], |c, x| if c == 3 { x + 8.0 } else { x }))
+    }),
     ("focal_length_negative", "focal-length", Error, |d| d.json(|v| v["fl_x"] = json!(-300.0))),
     ("focal_length_in_millimetres", "focal-length", Warning, |d| {
         d.json(|v| {

@@ -4,6 +4,7 @@
 //! Three passes: the description (`transforms.json`), every image, and whether cameras, depth,
 //! masks and states agree with each other in space.
 
+mod apart;
 mod description;
 mod fix;
 mod motion;
@@ -96,8 +97,8 @@ impl CheckReport {
 
     /// What makes a whole build worthless, rather than a frame or two of it.
     pub fn grave(&self) -> impl Iterator<Item = &Finding> {
-        const GRAVE: [&str; 6] =
-            ["camera-axes", "depth-unit", "views-disagree", "one-place", "states-apart", "nothing-moves"];
+        const GRAVE: [&str; 7] =
+            ["camera-axes", "depth-unit", "views-disagree", "view-apart", "one-place", "states-apart", "nothing-moves"];
         self.findings.iter().filter(|f| f.severity == Severity::Error && GRAVE.contains(&f.code))
     }
 

@@ -42,6 +42,7 @@ pub(super) fn check(
         out.push(finding);
         return Vec::new();
     }
+    super::apart::views(documents, recording, looks, out);
     if !recording.registered {
         // What lies where says nothing before the worlds are brought together.
         let place = format!("{}: registered = false", recording.root.display());

@@ -210,7 +210,10 @@ fn entry(
         (Some(state), _) => state,
         (None, DefaultState::Is(state)) => state,
         (None, DefaultState::None) => {
-            return Err(f.missing("state", "which joint configuration the picture shows, from 0"));
+            return Err(f.missing(
+                "state",
+                "which joint configuration the picture shows, from 0; `hingecast import` reads other tools' files",
+            ));
         }
     };
     let split = if test.contains(&normal_name(file_path)) { Split::Test } else { Split::Train };
