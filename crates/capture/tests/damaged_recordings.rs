@@ -246,6 +246,18 @@ const CASES: &[Case] = &[
     }),
     ("a_mask_is_empty", "mask-empty", Fixed, |d| image(&d.file(4, "mask_path"), |_| 0)),
     ("a_mask_is_full", "mask-full", Fixed, |d| image(&d.file(4, "mask_path"), |_| 255)),
+    ("a_state_has_no_masks", "state-unmasked", Error, |d| {
+        d.frames(|f| {
+            if f["state"] == 1 {
+                f.as_object_mut().unwrap().remove("mask_path");
+            }
+        })
+    }),
+    ("the_masks_of_a_state_are_full", "state-unmasked", Fixed, |d| {
+        let v: Value = serde_json::from_str(&d.text()).unwrap();
+        let frames = v["frames"].as_array().unwrap();
+        (0..frames.len()).filter(|&i| frames[i]["state"] == 1).for_each(|i| image(&d.file(i, "mask_path"), |_| 255));
+    }),
     ("masks_are_inverted", "mask-inverted", Fixed, |d| {
         let v: Value = serde_json::from_str(&d.text()).unwrap();
         for i in 0..v["frames"].as_array().unwrap().len() {

@@ -60,6 +60,38 @@ fn two_scans_are_two_states_of_separate_worlds() {
     assert!(Recording::open(&first).unwrap().registered);
 }
 
+/// Scans know where they are, not how far that is from each other; and what came out before is replaced
+/// only by what opens.
+#[test]
+fn a_scan_far_away_is_no_stray_and_a_bad_one_replaces_nothing() {
+    let dir = tempfile::tempdir().unwrap();
+    let [a, b, out] = ["a", "b", "rec"].map(|n| dir.path().join(n));
+    let both = json!({ "metric": true, "name": "cupboard", "doubts": ["a turn was guessed"] });
+    scan(&a, 0, both.clone());
+    scan(&b, 1, both);
+    let change = |change: &dyn Fn(&mut Value)| {
+        let path = b.join("transforms.json");
+        let mut json: Value = serde_json::from_slice(&std::fs::read(&path).unwrap()).unwrap();
+        change(&mut json);
+        write_json(path, json);
+    };
+    change(&|scan| {
+        for frame in scan["frames"].as_array_mut().unwrap() {
+            frame["transform_matrix"][0][3] = json!(frame["transform_matrix"][0][3].as_f64().unwrap() + 6000.0);
+        }
+    });
+    import(&[&a, &b], &out, &Config::default(), &Default::default()).unwrap();
+    let recording = Recording::open(&out).unwrap();
+    assert_eq!((recording.frames.len(), &*recording.name), (10, "cupboard"));
+    assert_eq!(recording.doubts, ["a turn was guessed", "a turn was guessed"]);
+    recording.write().unwrap();
+    assert_eq!(Recording::open(&out).unwrap().doubts, recording.doubts);
+    let before = std::fs::read(out.join("transforms.json")).unwrap();
+    change(&|scan| scan["frames"][2]["transform_matrix"][0][3] = json!(1e9));
+    import(&[&a, &b], &out, &Config::default(), &Default::default()).unwrap_err();
+    assert_eq!(std::fs::read(out.join("transforms.json")).unwrap(), before);
+}
+
 /// Only where the sources disagree are their worlds turned.
 #[test]
 fn ups_that_differ_become_z() {

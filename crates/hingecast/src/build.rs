@@ -145,6 +145,7 @@ fn build_with(
 
     let (prepared, doubts) =
         crate::prepare::for_build(&mut recording, &mut folder, (config.seed, options.force), watcher)?;
+    let doubts = recording.doubts.iter().cloned().chain(doubts).collect();
     let cache = ViewCache::new(&recording, config.memory_mb << 20);
     let background = targets::background(&recording, &cache)?;
     let mut inputs =

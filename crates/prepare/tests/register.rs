@@ -62,6 +62,26 @@ fn a_pushed_thing_does_not_drag_the_world_along() {
     assert!(turn < 0.1 && shift < 0.001, "{turn} deg, {shift} m: {:#?}", found.pairs);
 }
 
+/// How loosely scans are held grows with the noise of their surfaces, and is more than they are off.
+#[test]
+fn what_holds_a_scan_loosely_is_said() {
+    let scene = [room(), cupboard(30.0, Pose::IDENTITY)].concat();
+    let slack = [0.004, 0.04].map(|noise| {
+        let worlds = own_worlds(2, 0.0);
+        let mut states: Vec<_> = (0..2).map(|k| views(&scene, &worlds[k], 12, k as u64)).collect();
+        let mut rng = fastrand::Rng::with_seed(7);
+        let depths = states.iter_mut().flatten().flat_map(|view| &mut view.depth);
+        depths.for_each(|z| *z *= 1.0 + noise * (rng.f32() - 0.5));
+        let found = register(&mut states, Freedom::AboutUp(DVec3::Z), 0, &Progress::default()).unwrap();
+        let (turn, _) = error(&found.common_from_state, &worlds);
+        assert_eq!((found.slack.len(), found.slack[0]), (2, 0.0));
+        let slack = found.slack[1].to_degrees();
+        assert!(turn < slack, "off by {turn} deg, {slack} said");
+        slack
+    });
+    assert!(slack[0] < 0.3 && slack[1] > 2.0 * slack[0], "{slack:?} deg");
+}
+
 #[test]
 fn an_empty_room_is_no_place() {
     let worlds = own_worlds(2, 0.0);

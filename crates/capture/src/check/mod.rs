@@ -97,8 +97,16 @@ impl CheckReport {
 
     /// What makes a whole build worthless, rather than a frame or two of it.
     pub fn grave(&self) -> impl Iterator<Item = &Finding> {
-        const GRAVE: [&str; 7] =
-            ["camera-axes", "depth-unit", "views-disagree", "view-apart", "one-place", "states-apart", "nothing-moves"];
+        const GRAVE: [&str; 8] = [
+            "camera-axes",
+            "depth-unit",
+            "views-disagree",
+            "view-apart",
+            "state-unmasked",
+            "one-place",
+            "states-apart",
+            "nothing-moves",
+        ];
         self.findings.iter().filter(|f| f.severity == Severity::Error && GRAVE.contains(&f.code))
     }
 

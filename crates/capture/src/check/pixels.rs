@@ -4,7 +4,7 @@
 use super::{Finding, Fix, Severity, address, error, warning};
 use crate::recording::mask;
 use crate::recording::transforms::Document;
-use crate::{CaptureError, Recording, View};
+use crate::{CaptureError, Recording, Split, View};
 use glam::{DVec2, DVec3};
 use hingecast_geom::{Camera, Progress};
 use rayon::prelude::*;
@@ -147,6 +147,28 @@ impl Look {
     }
 }
 
+/// Shares of a picture between which a mask shows an object.
+const SHOWS: std::ops::RangeInclusive<f64> = 2e-4..=0.995;
+
+/// States of a masked recording of which hardly a mask shows the object: what such a state shows is then taken
+/// for the object as a whole, or for nothing.
+fn unmasked_states(recording: &Recording, looks: &[Option<Look>]) -> Vec<Finding> {
+    let of_state = |state: usize| {
+        let frames = recording.frames_of(state, Split::Train);
+        let asked: Vec<&Look> =
+            frames.iter().filter(|&&i| !recording.frames[i].occluded).filter_map(|&i| looks[i].as_ref()).collect();
+        let good = asked.iter().filter(|l| l.has_mask && SHOWS.contains(&l.mask)).count();
+        (2 * good < asked.len()).then(|| {
+            let what =
+                format!("only {good} of the {} pictures of a state have a mask that shows the object", asked.len());
+            let place = format!("{}: state {state}: frames[].mask_path", recording.root.display());
+            let hint = "give that state masks, too; or take all mask_path out: build then looks for the object itself";
+            Finding { state: Some(state), ..error("state-unmasked", CaptureError::new(what, place, hint)) }
+        })
+    };
+    (0..recording.n_states).filter_map(of_state).collect()
+}
+
 fn same_bytes(documents: &[Document], recording: &Recording, looks: &[Option<Look>], out: &mut Vec<Finding>) {
     let mut first_of = BTreeMap::<u128, usize>::new();
     for (i, look) in looks.iter().enumerate() {
@@ -200,6 +222,7 @@ fn masks(documents: &[Document], recording: &Recording, looks: &[Option<Look>], 
             Some(_) => {}
         }
     }
+    out.extend(unmasked_states(recording, looks));
     // An inverted mask covers the border of the picture and spares its middle.
     let inverted: Vec<usize> =
         known.iter().filter(|(_, l)| l.border > 0.8 && l.middle < l.border - 0.2).map(|(i, _)| *i).collect();
@@ -216,8 +239,8 @@ fn masks(documents: &[Document], recording: &Recording, looks: &[Option<Look>], 
     for (i, look) in known.into_iter().filter(|(i, _)| !inverted.contains(i)) {
         let occluded = recording.frames[i].occluded;
         let (what, code) = match look.mask {
-            m if m < 2e-4 && !occluded => ("a mask is empty: the object is not in the picture", "mask-empty"),
-            m if m > 0.995 => ("a mask covers the whole picture", "mask-full"),
+            m if m < *SHOWS.start() && !occluded => ("a mask is empty: the object is not in the picture", "mask-empty"),
+            m if m > *SHOWS.end() => ("a mask covers the whole picture", "mask-full"),
             _ => continue,
         };
         let (file, index, place) = address(documents, recording, i);

@@ -45,15 +45,15 @@ pub(super) fn join(parts: Vec<(PathBuf, Source)>) -> Result<Source, CaptureError
         if !alone {
             source.shots.iter_mut().for_each(|s| s.state = state);
         }
+        // One name for all that have one, or none.
+        all.name = if state == 0 { source.name } else { all.name.filter(|name| source.name.as_ref() == Some(name)) };
+        all.doubts.extend(source.doubts);
         all.registered &= alone && source.registered;
         all.shots.extend(source.shots);
         all.notes.extend(source.notes.into_iter().map(|note| name(&path, note, alone)));
     }
     if !alone {
-        all.notes.push(format!(
-            "{} scans were put together, each in the world frame of its own: \"registered\" is false",
-            all.states()
-        ));
+        all.notes.push(format!("{} scans were put together, each in a world frame of its own so far", all.states()));
     }
     Ok(all)
 }

@@ -159,6 +159,10 @@ pub(crate) struct Source {
     pub registered: bool,
     /// The second state is a film.
     pub film: bool,
+    /// What it calls the object, if it says so.
+    pub name: Option<String>,
+    /// What its maker was not sure of.
+    pub doubts: Vec<String>,
     /// See [`ImportReport::notes`].
     pub notes: Vec<String>,
 }
@@ -173,7 +177,16 @@ impl Source {
 impl From<Vec<Shot>> for Source {
     /// Layouts that say nothing of scale and up.
     fn from(shots: Vec<Shot>) -> Self {
-        Self { shots, metric: false, up: DVec3::Z, registered: true, film: false, notes: Vec::new() }
+        Self {
+            shots,
+            metric: false,
+            up: DVec3::Z,
+            registered: true,
+            film: false,
+            name: None,
+            doubts: Vec::new(),
+            notes: Vec::new(),
+        }
     }
 }
 
@@ -270,7 +283,7 @@ fn convert<P: AsRef<Path>>(
     if !config.mask_ids.is_empty() {
         source.shots.iter_mut().for_each(|s| s.mask_ids.clone_from(&config.mask_ids));
     }
-    let name = recording_name(sources, out);
+    let name = source.name.clone().unwrap_or_else(|| recording_name(sources, out));
     let (recording, notes) = store::store(&source, &name, out, config.min_confidence, progress)?;
     source.notes.extend(notes);
     Ok(ImportReport {

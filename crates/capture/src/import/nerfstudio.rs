@@ -66,6 +66,8 @@ pub(super) fn read(src: &Path, one_state: bool) -> Result<Source, CaptureError> 
         up: documents.first().map_or(DVec3::Z, |d| d.up),
         registered: documents.iter().all(|d| d.registered),
         film: false,
+        name: documents.first().and_then(|d| d.name.clone()),
+        doubts: documents.iter().flat_map(|d| d.doubts.clone()).collect(),
         notes: Vec::new(),
     };
     if documents.iter().all(is_nerf_capture) {

@@ -64,6 +64,7 @@ pub(super) fn store(
         up: source.up,
         registered: source.registered,
         film: source.film,
+        doubts: source.doubts.clone(),
         settled: false,
     };
     recording.write()?;
@@ -71,8 +72,9 @@ pub(super) fn store(
     for folder in ["depth", "mask", "occluder"] {
         let _ = std::fs::remove_dir(work.path.join(folder));
     }
+    // What was written should open; if not, the source is not in order, and what stood at `out` stays.
+    Recording::open_uncut(&work.path)?;
     work.finish()?;
-    // What was written should open; if not, the source has gaps in its states.
     let mut notes = notes(&changes, min_confidence);
     notes.extend(labels::note(shots, changes.iter().map(|c| &c.labels)));
     Ok((Recording::open_uncut(&out)?, notes))

@@ -110,7 +110,7 @@ impl<'a> Fields<'a> {
     pub fn texts(&self, key: &str) -> Result<Vec<&'a str>, CaptureError> {
         let Some(value) = self.get(key) else { return Ok(Vec::new()) };
         let list = value.as_array().and_then(|a| a.iter().map(Value::as_str).collect::<Option<Vec<_>>>());
-        list.ok_or_else(|| self.wrong(key, value, "a list of file names"))
+        list.ok_or_else(|| self.wrong(key, value, "a list of texts"))
     }
 }
 

@@ -6,22 +6,14 @@ use crate::CaptureError;
 use serde_json::json;
 use std::path::{Path, PathBuf};
 
-/// Makes a folder for masks in the recording, `mask` or the first of `mask_2`, `mask_3`, ... that is
-/// free.
-///
-/// # Errors
-/// When the disk refuses.
-pub fn new_folder(recording: &Recording) -> Result<PathBuf, CaptureError> {
+/// A folder for masks in the recording that is not there yet: `mask`, or the first of `mask_2`, `mask_3`, ...
+/// whose name is free, as is that of the picture beside it, `.png`.
+pub fn free_folder(recording: &Recording) -> PathBuf {
     let names = (1..).map(|n| if n == 1 { "mask".to_string() } else { format!("mask_{n}") });
-    for name in names {
-        let path = recording.root.join(name);
-        match std::fs::create_dir(&path) {
-            Ok(()) => return Ok(path),
-            Err(e) if e.kind() == std::io::ErrorKind::AlreadyExists => {}
-            Err(e) => return Err(CaptureError::write(&path, e)),
-        }
-    }
-    unreachable!("there are more numbers than folders")
+    let mut paths = names.map(|name| recording.root.join(name));
+    let free =
+        |path: &PathBuf| [path.clone(), path.with_extension("png")].iter().all(|p| p.symlink_metadata().is_err());
+    paths.find(free).expect("there are more numbers than files")
 }
 
 /// Writes the masks' paths of `recording` into its `transforms.json`, and nothing else; the old file is kept

@@ -90,6 +90,8 @@ pub struct Recording {
     /// State 0 is a scan from all sides; the other states are cut out of a film of play: a few views
     /// each, and hands may be in them. `time` counts in the film.
     pub film: bool,
+    /// What whoever brought the scans together was not sure of; `build` hands it on.
+    pub doubts: Vec<String>,
     /// Everything that the scans show, the room too, holds the cameras where they are now. No file says
     /// so: what looked at all of it does, before a build.
     pub settled: bool,
@@ -148,6 +150,7 @@ impl Recording {
         let root = documents.first().map(|d| d.root.clone()).unwrap_or_default();
         let (mut frames, mut origins) = (Vec::new(), Vec::new());
         let (mut name, mut metric, mut up, mut registered) = (None, false, DVec3::Z, true);
+        let doubts = documents.iter().flat_map(|d| d.doubts.clone()).collect();
         let film = documents.iter().any(|d| d.film);
         for document in documents {
             problems.extend(document.problems.iter().cloned());
@@ -169,7 +172,16 @@ impl Recording {
                 *next += 1;
             }
         }
-        let stray = stray::cameras(&frames.iter().map(|f: &Frame| f.camera.centre()).collect::<Vec<_>>());
+        // Scans with a world each may lie anywhere.
+        let world = |f: &Frame| if registered { 0 } else { f.state };
+        let worlds: std::collections::BTreeSet<usize> = frames.iter().map(world).collect();
+        let mut stray = Vec::new();
+        for own in worlds {
+            let members: Vec<usize> = (0..frames.len()).filter(|&i| world(&frames[i]) == own).collect();
+            let centres: Vec<_> = members.iter().map(|&i| frames[i].camera.centre()).collect();
+            stray.extend(stray::cameras(&centres).into_iter().map(|(k, what)| (members[k], what)));
+        }
+        stray.sort_by_key(|s| s.0);
         for (i, what) in stray.into_iter().rev() {
             let (place, origin) = origins.remove(i);
             frames.remove(i);
@@ -179,7 +191,7 @@ impl Recording {
         let n_states = count_states(&frames, documents, problems);
         let folder = || root.file_name().map(|n| n.to_string_lossy().into_owned()).unwrap_or("recording".into());
         let name = name.unwrap_or_else(folder);
-        Self { root, name, frames, n_states, metric, up, registered, film, settled: false }
+        Self { root, name, frames, n_states, metric, up, registered, film, doubts, settled: false }
     }
 
     /// Whether a state is cut out of a film: a picture or a few of one camera, hands in them.

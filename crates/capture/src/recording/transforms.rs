@@ -56,6 +56,8 @@ pub(crate) struct Document {
     pub metric: bool,
     pub up: DVec3,
     pub registered: bool,
+    /// What its maker was not sure of.
+    pub doubts: Vec<String>,
     pub film: bool,
     pub problems: Vec<Problem>,
 }
@@ -139,11 +141,13 @@ pub(crate) fn parse(root: &Path, file: &Path, folder_state: DefaultState) -> Res
         up: DVec3::Z,
         registered: true,
         film: false,
+        doubts: Vec::new(),
         problems: Vec::new(),
     };
     keep(top.text("name").map(|t| document.name = t.map(String::from)));
     keep(top.flag("metric").map(|m| document.metric = m.unwrap_or(false)));
     keep(top.flag("film").map(|f| document.film = f.unwrap_or(false)));
+    keep(top.texts("doubts").map(|t| document.doubts.extend(t.into_iter().map(String::from))));
     keep(top.flag("registered").map(|r| document.registered = r.unwrap_or(true)));
     keep(top.numbers("up").and_then(|up| match up.map(DVec3::from_array).map(|u| (u, u.try_normalize())) {
         None => Ok(()),

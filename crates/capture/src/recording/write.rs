@@ -25,6 +25,9 @@ impl Recording {
         if !self.registered {
             top.insert("registered".into(), json!(false));
         }
+        if !self.doubts.is_empty() {
+            top.insert("doubts".into(), json!(self.doubts));
+        }
         if self.film {
             top.insert("film".into(), json!(true));
         }

@@ -134,6 +134,7 @@ pub fn synth(
         metric: object.metric,
         up: DVec3::Z,
         film: false,
+        doubts: Vec::new(),
         settled: false,
         registered: film || config.world.frames == Frames::Shared,
     };

@@ -32,7 +32,7 @@ pub fn run(session: &Session, args: &Demo) -> Result<Outcome> {
     session.ui.say(&format!("\n{}", table::detail(&evaluation)));
     let twin = folder.folder("twin");
     session.ui.say(&format!("\nreport: {}\ntwin:   {}", page.display(), twin.display()));
-    session.ui.say(&format!("look:   python -m mujoco.viewer --mjcf={}", twin.join("robot.xml").display()));
+    session.ui.say(&format!("look:   python3 -m mujoco.viewer --mjcf={}", twin.join("robot.xml").display()));
     session.answer(&evaluation)?;
     Ok(Outcome::Done)
 }

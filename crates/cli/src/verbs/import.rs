@@ -36,8 +36,11 @@ pub fn run(session: &Session, args: &Import) -> Result<Outcome> {
         (registration, states) = (Some(film.registration), recording.n_states);
     } else if !recording.registered && recording.n_states > 1 {
         let found = prepare::register(&mut recording, 0, &session.ui.stage("register"))?;
+        let doubts = prepare::registration_doubts(&found);
+        recording.doubts.extend(doubts.iter().cloned());
         recording.write()?;
         session.ui.say(&prepare::sentence(&found));
+        doubts.iter().for_each(|doubt| session.ui.say(&format!("doubt: {doubt}")));
         registration = Some(found);
     }
     if prepare::Needs::of(&recording)?.masks {

@@ -7,6 +7,9 @@ use hingecast::prepare;
 use hingecast::prepare::Wanted;
 use hingecast_capture::Recording;
 use hingecast_capture::recording::masked;
+use hingecast_geom::staging::Staging;
+
+use std::path::Path;
 
 pub fn run(session: &Session, args: &Mask) -> Result<Outcome> {
     let mut recording = Recording::open(&args.recording)?;
@@ -21,19 +24,23 @@ pub fn run(session: &Session, args: &Mask) -> Result<Outcome> {
         return Err(Failure::new("nothing was written", place, hint));
     }
     let wanted = wanted(args, &recording)?;
-    let folder = masked::new_folder(&recording)?;
+    let folder = masked::free_folder(&recording);
+    let staging = Staging::new(&folder).map_err(Failure::io(&folder))?;
     let progress = session.ui.stage("mask");
     // Cameras that drifted are corrected for the search alone: the poses of the recording stay.
     let mut settled = recording.clone();
     prepare::settle(&mut settled, false, &progress)?;
-    let report = prepare::find_masks(&mut settled, &wanted, &folder, args.seed, &progress)?;
+    let report = prepare::find_masks(&mut settled, &wanted, &staging.path(), args.seed, &progress)?;
     drop(progress);
-    for (frame, found) in recording.frames.iter_mut().zip(settled.frames) {
-        (frame.mask, frame.mask_ids) = (found.mask, found.mask_ids);
-    }
-    masked::write(&recording)?;
     let sheet = folder.with_extension("png");
-    prepare::contact_sheet(&recording)?.save(&sheet).map_err(Failure::io(&sheet))?;
+    prepare::write_contact_sheet(&settled, &sheet)?;
+    staging.finish().map_err(Failure::io(&folder))?;
+    for (frame, found) in recording.frames.iter_mut().zip(settled.frames) {
+        frame.mask = found.mask.as_deref().and_then(Path::file_name).map(|name| folder.join(name));
+        frame.mask_ids = found.mask_ids;
+    }
+    // Last: a recording points to masks that are all there.
+    masked::write(&recording)?;
     report.doubts.iter().for_each(|d| session.ui.say(&format!("doubt: {d}")));
     session.ui.say(&format!("masks -> {}\nlook: {}", folder.display(), sheet.display()));
     session.answer(&serde_json::json!({ "masks": folder, "sheet": sheet, "report": report }))?;

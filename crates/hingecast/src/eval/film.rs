@@ -70,6 +70,7 @@ mod tests {
             up: DVec3::Z,
             registered: true,
             film: true,
+            doubts: Vec::new(),
             settled: false,
         }
     }

@@ -31,8 +31,8 @@ pub use hingecast_prepare::Wanted;
 pub use masks::{find_masks, place_at};
 pub use page::write_page;
 pub use places::{register, settle};
-pub use sheet::{SHEET_CAPTION, contact_sheet};
-pub use words::sentence;
+pub use sheet::{SHEET_CAPTION, contact_sheet, write_contact_sheet};
+pub use words::{registration_doubts, sentence};
 
 /// The name of the step, and of its folder in a run.
 pub const STAGE: &str = "prepare";
@@ -175,13 +175,14 @@ fn prepared(
     if needs.registration {
         let found = register(recording, seed, progress)?;
         watcher.say(&sentence(&found));
+        prepared.doubts.extend(registration_doubts(&found));
         prepared.registration = Some(found);
     }
     if needs.masks {
         watcher.say("the recording has no masks: the object is taken for what moves and what that hangs on");
         let report = find_masks(recording, &Wanted::Moving, at, seed, progress)?;
         contact_sheet(recording)?.save(at.join("masks.png")).map_err(Failure::io(at))?;
-        prepared.doubts.clone_from(&report.doubts);
+        prepared.doubts.extend(report.doubts.iter().cloned());
         prepared.masks = Some(report);
     }
     if recording.film {

@@ -1,7 +1,7 @@
 //! Where cameras, states and the object stand: what is corrected in a recording, and kept beside it.
 
 use super::raw_depths::RawDepths;
-use super::words::failure;
+use super::words::{AGREE_WELL, failure};
 use crate::failure::Result;
 use hingecast_capture::{Recording, Split};
 use hingecast_geom::{Pose, Progress};
@@ -57,6 +57,13 @@ pub fn register(recording: &mut Recording, seed: u64, progress: &Progress) -> Re
     let found = match hingecast_prepare::register(&mut depths, up, seed, progress) {
         // Up may not be what the file says.
         Err(PrepareError::Apart { .. }) => hingecast_prepare::register(&mut depths, Freedom::Any, seed, progress),
+        Ok(upright) if upright.least_share() < AGREE_WELL => {
+            match hingecast_prepare::register(&mut depths, Freedom::Any, seed, progress) {
+                Ok(any) if any.least_share() > upright.least_share() => Ok(any),
+                Err(e @ (PrepareError::Cancelled(_) | PrepareError::Depths(_))) => Err(e),
+                _ => Ok(upright),
+            }
+        }
         other => other,
     };
     let found = found.map_err(|e| failure(e, recording))?;

@@ -1,8 +1,10 @@
 //! Pictures of every state with what is not the object darkened.
 
-use crate::failure::Result;
+use crate::failure::{Failure, Result};
 use hingecast_capture::{Recording, Split};
-use image::{Rgb, RgbImage};
+use hingecast_geom::staging::write_whole;
+use image::{ImageFormat, Rgb, RgbImage};
+use std::path::Path;
 
 /// Pictures of a state.
 const ACROSS: usize = 6;
@@ -14,6 +16,16 @@ const STATES: usize = 12;
 /// What a sheet says below itself.
 pub const SHEET_CAPTION: &str =
     "a row a state, of a film its pictures in the order of time; what is not the object is dark";
+
+/// Writes [`contact_sheet`] as a PNG file, whole or not at all.
+///
+/// # Errors
+/// When a picture cannot be read, or the file not be written.
+pub fn write_contact_sheet(recording: &Recording, path: &Path) -> Result<()> {
+    let mut png = std::io::Cursor::new(Vec::new());
+    contact_sheet(recording)?.write_to(&mut png, ImageFormat::Png).expect("written to memory");
+    write_whole(path, png.get_ref()).map_err(Failure::io(path))
+}
 
 /// One row a state: pictures spread over its views, the background at a quarter of its brightness,
 /// the object's border red. Of a film a row of the scan, and then its states one after the other.

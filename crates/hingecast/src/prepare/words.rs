@@ -20,6 +20,34 @@ pub fn sentence(found: &Registration) -> String {
     })
 }
 
+/// Scans that were brought together rightly agree on this share of what two of them see, and nearly always
+/// on more. Below it, up may not be what the files say; and it is doubted.
+pub(super) const AGREE_WELL: f64 = 0.88;
+
+/// Slack from which a registration is doubted, degrees: joints are to be right to half of one.
+const LOOSE: f64 = 1.0;
+
+/// A doubt where scans agree on too little, and for each state whose frame is held loosely.
+pub fn registration_doubts(found: &Registration) -> Vec<String> {
+    let loose = found.slack.iter().enumerate().filter(|(_, slack)| slack.to_degrees() > LOOSE);
+    let least = found.least_share();
+    let little = (least < AGREE_WELL).then(|| {
+        format!(
+            "of what two scans both see only {:.0} % agrees: their frames may have been brought together wrongly; look at \
+             the states overlaid (hingecast check RECORDING -o page.html)",
+            100.0 * least
+        )
+    });
+    let loose = loose.map(|(state, slack)| {
+        format!(
+            "state {state}: its frame could be turned by {:.1} deg, and what it shares with the others would lie no \
+                 worse: joints may be off by as much; scan with floor, another wall and a few things around",
+            slack.to_degrees().min(180.0)
+        )
+    });
+    little.into_iter().chain(loose).collect()
+}
+
 pub(super) fn failure(e: PrepareError, recording: &Recording) -> Failure {
     let place = recording.root.display().to_string();
     let hint = match &e {

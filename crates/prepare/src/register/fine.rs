@@ -16,24 +16,30 @@ const ROUNDS: usize = 3;
 /// Samples of a scan that are aligned.
 const SAMPLES: usize = 12_000;
 
-/// One round of Gauss and Newton. `gate`: farthest neighbour, scene units; `scale`: residual at
-/// which a sample's weight has fallen to a quarter (Geman and McClure). Returns the pose, and
-/// the lower quartile and the median of the absolute residuals within the gate.
-pub(crate) fn step(
-    points: &[Vec3],
-    normals: &[Vec3],
-    target: &Surface,
-    pose: Pose,
-    gate: f32,
-    scale: f64,
-) -> (Pose, [f64; 2]) {
+/// What samples near a surface say about where their scan stands.
+struct Round {
+    /// Normal equations of the turn about `centre` and the shift, weighted.
+    a: Matrix6<f64>,
+    b: Vector6<f64>,
+    /// Sum of the weights.
+    weight: f64,
+    /// Absolute residuals of the samples that count, scene units, in no order.
+    residuals: Vec<f64>,
+    centre: DVec3,
+}
+
+/// `gate`: farthest neighbour, scene units; `scale`: residual at which a sample's weight has fallen to
+/// a quarter (Geman and McClure).
+fn round(cloud: (&[Vec3], &[Vec3]), target: &Surface, pose: Pose, gate: f32, scale: f64) -> Round {
+    let (points, normals) = cloud;
     let (rot, trans) = (pose.mat3().as_mat3(), pose.trans.as_vec3());
     let centre = pose.apply(points.iter().sum::<Vec3>().as_dvec3() / points.len().max(1) as f64);
+    let none = || Round { a: Matrix6::zeros(), b: Vector6::zeros(), weight: 0.0, residuals: Vec::new(), centre };
     let order: Vec<usize> = (0..points.len()).collect();
-    let chunks: Vec<(Matrix6<f64>, Vector6<f64>, Vec<f64>)> = order
+    let chunks: Vec<Round> = order
         .par_chunks(1024)
         .map(|chunk| {
-            let (mut a, mut b, mut residuals) = (Matrix6::zeros(), Vector6::zeros(), Vec::new());
+            let mut sum = none();
             for &i in chunk {
                 let (x, m) = (rot * points[i] + trans, rot * normals[i]);
                 let Some((j, squared)) = target.nearest(x) else { continue };
@@ -42,24 +48,42 @@ pub(crate) fn step(
                     continue;
                 }
                 let r = f64::from(n.dot(x - target.points[j]));
-                residuals.push(r.abs());
+                sum.residuals.push(r.abs());
                 let w = (1.0 + (r / scale).powi(2)).powi(-2);
                 let (arm, n) = (x.as_dvec3() - centre, n.as_dvec3());
                 let c = arm.cross(n);
                 let row = Vector6::new(c.x, c.y, c.z, n.x, n.y, n.z);
-                a += w * row * row.transpose();
-                b -= w * row * r;
+                sum.a += w * row * row.transpose();
+                sum.b -= w * row * r;
+                sum.weight += w;
             }
-            (a, b, residuals)
+            sum
         })
         .collect();
-    let (mut a, mut b, mut residuals) = (Matrix6::zeros(), Vector6::zeros(), Vec::new());
-    for (ca, cb, cr) in chunks {
-        a += ca;
-        b += cb;
-        residuals.extend(cr);
-    }
-    if residuals.len() < 30 {
+    chunks.into_iter().fold(none(), |mut sum, chunk| {
+        sum.a += chunk.a;
+        sum.b += chunk.b;
+        sum.weight += chunk.weight;
+        sum.residuals.extend(chunk.residuals);
+        sum
+    })
+}
+
+/// Fewer samples near a surface say nothing.
+const FEWEST: usize = 30;
+
+/// One round of Gauss and Newton (see [`fn@round`]). Returns the pose, and the lower quartile and the
+/// median of the absolute residuals within the gate.
+pub(crate) fn step(
+    points: &[Vec3],
+    normals: &[Vec3],
+    target: &Surface,
+    pose: Pose,
+    gate: f32,
+    scale: f64,
+) -> (Pose, [f64; 2]) {
+    let Round { a, b, mut residuals, centre, .. } = round((points, normals), target, pose, gate, scale);
+    if residuals.len() < FEWEST {
         return (pose, [f64::INFINITY; 2]);
     }
     let last = residuals.len() - 1;
@@ -196,4 +220,75 @@ pub(super) fn carried(cloud: &Cloud, pose: &Pose) -> (Vec<Vec3>, Vec<Vec3>) {
     let (rot, trans) = (pose.mat3().as_mat3(), pose.trans.as_vec3());
     let points = cloud.points.iter().map(|x| rot * *x + trans).collect();
     (points, cloud.normals.iter().map(|n| rot * *n).collect())
+}
+
+/// How far each state's scan could turn, or slide at its own radius, before its samples were farther
+/// from the others' surfaces than they are in the median, in the direction that holds it least. A flat
+/// door turns in its plane, and only its handle objects. Residuals are taken to err alike
+/// everywhere, as depth cameras do; rooms with time-of-flight noise were off by half of it. 0 for
+/// state 0, whose frame is everybody's. [state], radians
+pub(super) fn slack(scans: &[Scan], poses: &[Pose], seed: u64) -> Vec<f64> {
+    let voxel = scans.iter().map(|s| s.fine_voxel).fold(0.0, f32::max);
+    let of_state = |s: usize| {
+        let cloud = balanced::pick(&scans[s].fine, SAMPLES, seed);
+        let others = (0..scans.len()).filter(|&r| r != s).take(ALL).map(|r| (&scans[r], poses[r]));
+        let surface = surface(others);
+        let (mut scale, mut slack) = (f64::from(voxel), f64::INFINITY);
+        for _ in 0..3 {
+            let mut now = round((&cloud.points, &cloud.normals), &surface, poses[s], 2.0 * voxel, scale);
+            if now.residuals.len() < FEWEST {
+                return f64::INFINITY;
+            }
+            let middle = now.residuals.len() / 2;
+            let median = *now.residuals.select_nth_unstable_by(middle, f64::total_cmp).1;
+            scale = (3.0 * median).clamp(0.05 * f64::from(voxel), f64::from(voxel));
+            let squared = |x: &Vec3| (poses[s].apply(x.as_dvec3()) - now.centre).length_squared();
+            let radius = (cloud.points.iter().map(squared).sum::<f64>() / cloud.points.len() as f64).sqrt();
+            slack = median / felt(&now, radius) / radius;
+        }
+        slack
+    };
+    (0..scans.len()).into_par_iter().map(|s| if s == 0 { 0.0 } else { of_state(s) }).collect()
+}
+
+/// How far samples come off their planes, root mean square, when the scan moves by 1 the way they feel least:
+/// shifts, and turns by the way of a sample at the radius.
+fn felt(round: &Round, radius: f64) -> f64 {
+    let unit = |k: usize| if k < 3 { 1.0 / radius } else { 1.0 };
+    let scaled = Matrix6::from_fn(|i, j| round.a[(i, j)] * unit(i) * unit(j) / round.weight);
+    scaled.symmetric_eigenvalues().min().max(1e-12).sqrt()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A disc, one sample in `one_in` of which faces along the disc: half of these outwards, which hold
+    /// shifts, half aside, which hold the turn.
+    fn disc(one_in: usize) -> Round {
+        let mut cloud = (Vec::new(), Vec::new());
+        for k in 0..6000 {
+            let (sin, cos) = (2.4 * k as f32).sin_cos();
+            let out = Vec3::new(cos, sin, 0.0);
+            cloud.0.push((k as f32 / 6000.0).sqrt() * out);
+            cloud.1.push(match k % (2 * one_in) {
+                0 => out,
+                n if n == one_in => Vec3::new(-sin, cos, 0.0),
+                _ => Vec3::Z,
+            });
+        }
+        let surface = Surface::new(cloud.0.clone(), cloud.1.clone());
+        round((&cloud.0, &cloud.1), &surface, Pose::IDENTITY, 0.01, 0.1)
+    }
+
+    #[test]
+    fn a_flat_thing_feels_its_turn_by_the_few_samples_that_face_along_it() {
+        // Of a squared turn the samples that face aside feel all, as far as they are out; they are one in
+        // two times `one_in`.
+        for one_in in [2, 10, 50] {
+            let felt = felt(&disc(one_in), 0.5f64.sqrt());
+            let expected = (0.5 / one_in as f64).sqrt();
+            assert!((felt / expected - 1.0).abs() < 0.1, "one in {one_in}: {felt}, expected {expected}");
+        }
+    }
 }

@@ -54,6 +54,17 @@ pub struct Registration {
     /// Largest turn, radians, and shift, scene units, by which two ways of going from one state to
     /// another around a circle of pairs differ after the fine step; 0 with two states.
     pub circle: (f64, f64),
+    /// By how much each state's frame could be turned, radians, or shifted, shares of the scan's radius,
+    /// without its surfaces lying worse than they do: what holds it least. [state]
+    #[serde(default)]
+    pub slack: Vec<f64>,
+}
+
+impl Registration {
+    /// Of the pairs that connect the states, the least share that agrees; 1 with one state.
+    pub fn least_share(&self) -> f64 {
+        self.pairs.iter().filter(|p| p.used).map(|p| p.share).fold(1.0, f64::min)
+    }
 }
 
 /// How well two scans fit.
@@ -102,6 +113,7 @@ pub fn register(
         at((r, s)).or_else(|| at((s, r)).map(|p| p.inverse()))
     };
     let common_from_state = fine::together(&scans, poses, &order, &pair, seed);
+    let slack = fine::slack(&scans, &common_from_state, seed);
     let circle = circle(&pairs, &found, &common_from_state);
     let reports = pairs.iter().zip(&found).zip(used).map(|((&states, f), used)| PairReport {
         states,
@@ -109,7 +121,7 @@ pub fn register(
         second: f.second,
         used,
     });
-    Ok(Registration { common_from_state, pairs: reports.collect(), circle })
+    Ok(Registration { common_from_state, pairs: reports.collect(), circle, slack })
 }
 
 /// A state's scan.
