@@ -108,7 +108,7 @@ fn masks_that_are_all_black() {
     for entry in fs::read_dir(d.path().join("rec/mask")).unwrap().flatten() {
         black.save(entry.path()).unwrap();
     }
-    hingecast(d.path(), "build rec -o run").refused("hardly shows the object", "rec");
+    hingecast(d.path(), "build rec -o run").refused("have a mask that shows the object", "rec: state 0");
 }
 
 #[test]

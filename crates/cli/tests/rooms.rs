@@ -32,3 +32,45 @@ fn scans_with_a_world_each_and_no_masks_become_a_twin() {
         serde_json::from_slice(&std::fs::read(dir.join("rec/transforms.json")).unwrap()).unwrap();
     assert_eq!(json, now);
 }
+
+/// Files that say nothing of up, or the wrong thing: one scan of three stands on its head.
+#[test]
+fn a_scan_upside_down_is_turned() {
+    let dir = tempfile::tempdir().unwrap();
+    let dir = dir.path();
+    let world = "--states 3 --views 12 --test-views 0 --camera 160,120,132,132,80,60 --scene room --masks none";
+    hingecast(dir, &format!("synth microwave -o rec {world}")).done();
+    let read = |path: &str| -> serde_json::Value {
+        serde_json::from_slice(&std::fs::read(dir.join(path).join("transforms.json")).unwrap()).unwrap()
+    };
+    let truth = read("rec");
+    for state in 0..3 {
+        let mut scan = truth.clone();
+        scan.as_object_mut().unwrap().remove("up");
+        let frames = scan["frames"].as_array_mut().unwrap();
+        frames.retain(|f| f["state"] == state);
+        for f in frames {
+            f.as_object_mut().unwrap().remove("state");
+            for key in ["file_path", "depth_file_path"] {
+                f[key] = dir.join("rec").join(f[key].as_str().unwrap()).to_str().unwrap().into();
+            }
+            for row in 1..3 {
+                for column in (0..4).filter(|_| state == 1) {
+                    let x = f["transform_matrix"][row][column].as_f64().unwrap();
+                    f["transform_matrix"][row][column] = (-x).into();
+                }
+            }
+        }
+        std::fs::create_dir(dir.join(format!("scan_{state}"))).unwrap();
+        std::fs::write(dir.join(format!("scan_{state}/transforms.json")), scan.to_string()).unwrap();
+    }
+    let imported = hingecast(dir, "import scan_0 scan_1 scan_2 -o out").done();
+    assert!(!imported.stderr.contains("doubt"), "{imported}");
+    let out = read("out");
+    for (f, t) in out["frames"].as_array().unwrap().iter().zip(truth["frames"].as_array().unwrap()) {
+        for (row, column) in (0..3).flat_map(|r| (0..4).map(move |c| (r, c))) {
+            let [is, should] = [f, t].map(|f| f["transform_matrix"][row][column].as_f64().unwrap());
+            assert!((is - should).abs() < 0.01, "{}: {is}, should be {should}", t["file_path"]);
+        }
+    }
+}

@@ -24,7 +24,7 @@ pub enum PrepareError {
         state: usize,
         /// The state that it agrees with best.
         other: usize,
-        /// Share of the samples that can be judged which agree, percent.
+        /// Share of the samples that can be judged which agree, percent; of all samples, where few can be.
         percent: f64,
     },
     /// Two places fit a scan about equally well.

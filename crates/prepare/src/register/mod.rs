@@ -32,6 +32,8 @@ const AROUND: f32 = 0.02;
 const FEW: usize = 200;
 /// A pair agrees when this share of the samples that can be judged does.
 const AGREES: f64 = 0.6;
+/// And what agrees, less what contradicts, is this share of all samples: a corner of a room fits any corner.
+const OVERLAPS: f64 = 0.03;
 /// The second best place of a pair has at most this share of the best one's score.
 const SECOND: f64 = 0.8;
 
@@ -154,7 +156,8 @@ fn connect(n: usize, pairs: &[(usize, usize)], found: &[pair::Placed]) -> Result
     let mut order = vec![0];
     while let Some(missing) = (0..n).find(|&s| pose[s].is_none()) {
         let open = |k: &usize| pose[pairs[*k].0].is_some() != pose[pairs[*k].1].is_some();
-        let sure = |k: &usize| found[*k].share >= AGREES && found[*k].second <= SECOND;
+        let agrees = |k: usize| found[k].share >= AGREES && found[k].score >= OVERLAPS;
+        let sure = |k: &usize| agrees(*k) && found[*k].second <= SECOND;
         let best = |filter: &dyn Fn(&usize) -> bool| {
             let candidates = (0..pairs.len()).filter(|k| open(k) && filter(k));
             candidates.max_by(|&a, &b| found[a].score.total_cmp(&found[b].score).then(b.cmp(&a)))
@@ -164,8 +167,9 @@ fn connect(n: usize, pairs: &[(usize, usize)], found: &[pair::Placed]) -> Result
             let (r, s) = pairs.get(k).copied().unwrap_or((0, missing));
             let (state, other) = if pose[r].is_some() { (s, r) } else { (r, s) };
             let f = &found[k];
-            return Err(if f.share < AGREES {
-                PrepareError::Apart { state, other, percent: 100.0 * f.share }
+            return Err(if !agrees(k) {
+                let share = if f.share < AGREES { f.share } else { f.score.max(0.0) };
+                PrepareError::Apart { state, other, percent: 100.0 * share }
             } else {
                 PrepareError::Ambiguous { state, other, degrees: f.rival.0.to_degrees(), distance: f.rival.1 }
             });

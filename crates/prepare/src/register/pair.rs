@@ -44,7 +44,7 @@ pub(super) fn align(source: &Scan, target: &Scan, freedom: Freedom, seed: u64) -
         Freedom::AboutUp(up) => vec![(upright(up), upright(up))],
         Freedom::Any => {
             let (a, b) = (main_facings(&source.coarse), main_facings(&target.coarse));
-            a.iter().flat_map(|u| b.iter().take(2).map(move |v| (upright(*u), upright(*v)))).collect()
+            a.iter().flat_map(|u| b.iter().map(move |v| (upright(*u), upright(*v)))).collect()
         }
     };
     let voxel = source.voxel().max(target.voxel());
