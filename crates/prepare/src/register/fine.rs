@@ -226,7 +226,7 @@ pub(super) fn carried(cloud: &Cloud, pose: &Pose) -> (Vec<Vec3>, Vec<Vec3>) {
 /// from the others' surfaces than they are in the median, in the direction that holds it least. A flat
 /// door turns in its plane, and only its handle objects. Residuals are taken to err alike
 /// everywhere, as depth cameras do; rooms with time-of-flight noise were off by half of it. 0 for
-/// state 0, whose frame is everybody's. [state], radians
+/// state 0, whose frame is everybody's. `[state]`, radians
 pub(super) fn slack(scans: &[Scan], poses: &[Pose], seed: u64) -> Vec<f64> {
     let voxel = scans.iter().map(|s| s.fine_voxel).fold(0.0, f32::max);
     let of_state = |s: usize| {

@@ -57,7 +57,7 @@ pub struct Registration {
     /// another around a circle of pairs differ after the fine step; 0 with two states.
     pub circle: (f64, f64),
     /// By how much each state's frame could be turned, radians, or shifted, shares of the scan's radius,
-    /// without its surfaces lying worse than they do: what holds it least. [state]
+    /// without its surfaces lying worse than they do: what holds it least. `[state]`
     #[serde(default)]
     pub slack: Vec<f64>,
 }
