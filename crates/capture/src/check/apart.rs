@@ -3,6 +3,7 @@
 
 use super::pixels::Look;
 use super::{Finding, Fix, address, error};
+use crate::recording::stray::{median, middle};
 use crate::recording::transforms::Document;
 use crate::{CaptureError, Recording, Split};
 use glam::DVec3;
@@ -43,13 +44,4 @@ pub(super) fn views(documents: &[Document], recording: &Recording, looks: &[Opti
             }
         }
     }
-}
-
-fn median(mut all: Vec<f64>) -> f64 {
-    let at = all.len() / 2;
-    *all.select_nth_unstable_by(at, f64::total_cmp).1
-}
-
-fn middle(points: &[DVec3]) -> DVec3 {
-    DVec3::from_array([0, 1, 2].map(|k| median(points.iter().map(|p| p[k]).collect())))
 }

@@ -15,7 +15,7 @@ pub(crate) mod mask;
 pub mod masked;
 mod packed_depth;
 mod palette;
-mod stray;
+pub(crate) mod stray;
 pub(crate) mod transforms;
 mod view;
 mod write;

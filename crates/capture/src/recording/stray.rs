@@ -11,11 +11,7 @@ const FARTHEST: f64 = 1e7;
 
 /// Indices of the cameras that stand absurdly far from the others, ascending, and what to say.
 pub(super) fn cameras(centres: &[DVec3]) -> Vec<(usize, String)> {
-    let median = |mut all: Vec<f64>| {
-        all.sort_by(f64::total_cmp);
-        all.get(all.len() / 2).copied().unwrap_or(0.0)
-    };
-    let middle = DVec3::from_array([0, 1, 2].map(|k| median(centres.iter().map(|c| c[k]).collect())));
+    let middle = middle(centres);
     let usual = median(centres.iter().map(|c| c.distance(middle)).collect());
     let stray = |(i, c): (usize, &DVec3)| {
         let far = c.distance(middle);
@@ -30,6 +26,17 @@ pub(super) fn cameras(centres: &[DVec3]) -> Vec<(usize, String)> {
         }
     };
     centres.iter().enumerate().filter_map(stray).collect()
+}
+
+/// The upper median; 0 of nothing.
+pub(crate) fn median(mut all: Vec<f64>) -> f64 {
+    all.sort_by(f64::total_cmp);
+    all.get(all.len() / 2).copied().unwrap_or(0.0)
+}
+
+/// Medians of the three coordinates.
+pub(crate) fn middle(points: &[DVec3]) -> DVec3 {
+    DVec3::from_array([0, 1, 2].map(|k| median(points.iter().map(|p| p[k]).collect())))
 }
 
 #[cfg(test)]

@@ -8,7 +8,6 @@ use hingecast::prepare::Wanted;
 use hingecast_capture::Recording;
 use hingecast_capture::recording::masked;
 use hingecast_geom::staging::Staging;
-
 use std::path::Path;
 
 pub fn run(session: &Session, args: &Mask) -> Result<Outcome> {

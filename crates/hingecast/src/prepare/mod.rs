@@ -31,7 +31,7 @@ pub use hingecast_prepare::Wanted;
 pub use masks::{find_masks, place_at};
 pub use page::write_page;
 pub use places::{register, settle};
-pub use sheet::{SHEET_CAPTION, contact_sheet, write_contact_sheet};
+pub use sheet::{SHEET_CAPTION, write_contact_sheet};
 pub use words::{registration_doubts, sentence};
 
 /// The name of the step, and of its folder in a run.
@@ -181,7 +181,7 @@ fn prepared(
     if needs.masks {
         watcher.say("the recording has no masks: the object is taken for what moves and what that hangs on");
         let report = find_masks(recording, &Wanted::Moving, at, seed, progress)?;
-        contact_sheet(recording)?.save(at.join("masks.png")).map_err(Failure::io(at))?;
+        write_contact_sheet(recording, &at.join("masks.png"))?;
         prepared.doubts.extend(report.doubts.iter().cloned());
         prepared.masks = Some(report);
     }

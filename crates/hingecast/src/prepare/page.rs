@@ -1,7 +1,7 @@
 //! What `check` found, for a person who would rather look than read.
 
 use super::raw_depths::RawDepths;
-use super::sheet::{SHEET_CAPTION, contact_sheet};
+use super::sheet::{SHEET_CAPTION, write_contact_sheet};
 use crate::failure::{Failure, Result};
 use crate::report::html::{doubts, escape, head};
 use glam::{DVec2, DVec3};
@@ -26,7 +26,7 @@ pub fn write_page(recording: &Path, report: &CheckReport, page: &Path) -> Result
     doubts(&mut out, &report.summary().iter().map(ToString::to_string).collect::<Vec<_>>());
     if let Ok(recording) = Recording::open(recording) {
         let sheet = page.with_extension("png");
-        contact_sheet(&recording)?.save(&sheet).map_err(Failure::io(&sheet))?;
+        write_contact_sheet(&recording, &sheet)?;
         let name = sheet.file_name().unwrap_or_default().to_string_lossy().into_owned();
         let _ = write!(
             out,

@@ -17,7 +17,7 @@ const STATES: usize = 12;
 pub const SHEET_CAPTION: &str =
     "a row a state, of a film its pictures in the order of time; what is not the object is dark";
 
-/// Writes [`contact_sheet`] as a PNG file, whole or not at all.
+/// Writes pictures of every state, their masks shown, as a PNG file: whole or not at all.
 ///
 /// # Errors
 /// When a picture cannot be read, or the file not be written.
@@ -32,7 +32,7 @@ pub fn write_contact_sheet(recording: &Recording, path: &Path) -> Result<()> {
 ///
 /// # Errors
 /// When a picture cannot be read.
-pub fn contact_sheet(recording: &Recording) -> Result<RgbImage> {
+fn contact_sheet(recording: &Recording) -> Result<RgbImage> {
     let mut rows = Vec::new();
     for frames in frames(recording) {
         let mut row = Vec::new();

@@ -42,7 +42,7 @@ pub fn registration_doubts(found: &Registration) -> Vec<String> {
         format!(
             "state {state}: its frame could be turned by {:.1} deg, and what it shares with the others would lie no \
                  worse: joints may be off by as much; scan with floor, another wall and a few things around",
-            slack.to_degrees().min(180.0)
+            slack.to_degrees()
         )
     });
     little.into_iter().chain(loose).collect()

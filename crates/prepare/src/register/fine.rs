@@ -10,6 +10,7 @@ use hingecast_geom::icp::Surface;
 use hingecast_geom::pose::quat_from_rotation_vector;
 use nalgebra::{Matrix6, Vector6};
 use rayon::prelude::*;
+use std::f64::consts::PI;
 
 /// Rounds of all states together.
 const ROUNDS: usize = 3;
@@ -116,7 +117,7 @@ pub(super) fn together(
         for _ in 0..rounds {
             let (better, [_, median]) = step(&own[s].points, &own[s].normals, &surface, pose, 2.0 * voxel, scale);
             pose = better;
-            scale = (3.0 * median).clamp(0.05 * f64::from(voxel), f64::from(voxel));
+            scale = narrowed(voxel, median);
         }
         pose
     };
@@ -145,6 +146,11 @@ pub(super) fn together(
         poses[0] = Pose::IDENTITY;
     }
     poses
+}
+
+/// The scale of a round after one whose median residual is known.
+fn narrowed(voxel: f32, median: f64) -> f64 {
+    (3.0 * median).clamp(0.05 * f64::from(voxel), f64::from(voxel))
 }
 
 /// Of the places that `starts` lead to, the one at which most of a scan lies exactly on `surface`. Where
@@ -226,27 +232,28 @@ pub(super) fn carried(cloud: &Cloud, pose: &Pose) -> (Vec<Vec3>, Vec<Vec3>) {
 /// from the others' surfaces than they are in the median, in the direction that holds it least. A flat
 /// door turns in its plane, and only its handle objects. Residuals are taken to err alike
 /// everywhere, as depth cameras do; rooms with time-of-flight noise were off by half of it. 0 for
-/// state 0, whose frame is everybody's. `[state]`, radians
+/// state 0, whose frame is everybody's; a half turn where nothing holds it. `[state]`, radians
 pub(super) fn slack(scans: &[Scan], poses: &[Pose], seed: u64) -> Vec<f64> {
     let voxel = scans.iter().map(|s| s.fine_voxel).fold(0.0, f32::max);
     let of_state = |s: usize| {
         let cloud = balanced::pick(&scans[s].fine, SAMPLES, seed);
         let others = (0..scans.len()).filter(|&r| r != s).take(ALL).map(|r| (&scans[r], poses[r]));
         let surface = surface(others);
-        let (mut scale, mut slack) = (f64::from(voxel), f64::INFINITY);
-        for _ in 0..3 {
+        let at = |scale: f64| {
             let mut now = round((&cloud.points, &cloud.normals), &surface, poses[s], 2.0 * voxel, scale);
-            if now.residuals.len() < FEWEST {
-                return f64::INFINITY;
-            }
             let middle = now.residuals.len() / 2;
-            let median = *now.residuals.select_nth_unstable_by(middle, f64::total_cmp).1;
-            scale = (3.0 * median).clamp(0.05 * f64::from(voxel), f64::from(voxel));
-            let squared = |x: &Vec3| (poses[s].apply(x.as_dvec3()) - now.centre).length_squared();
-            let radius = (cloud.points.iter().map(squared).sum::<f64>() / cloud.points.len() as f64).sqrt();
-            slack = median / felt(&now, radius) / radius;
-        }
-        slack
+            let enough = now.residuals.len() >= FEWEST;
+            let median = enough.then(|| *now.residuals.select_nth_unstable_by(middle, f64::total_cmp).1)?;
+            Some((now, median))
+        };
+        // The scale twice narrowed, as the poses were found with.
+        let narrow = |scale: f64| at(scale).map(|(_, median)| narrowed(voxel, median));
+        let last = narrow(f64::from(voxel)).and_then(narrow).and_then(at);
+        // Held by nothing: files know no infinity.
+        let Some((now, median)) = last else { return PI };
+        let squared = |x: &Vec3| (poses[s].apply(x.as_dvec3()) - now.centre).length_squared();
+        let radius = (cloud.points.iter().map(squared).sum::<f64>() / cloud.points.len() as f64).sqrt();
+        (median / felt(&now, radius) / radius).min(PI)
     };
     (0..scans.len()).into_par_iter().map(|s| if s == 0 { 0.0 } else { of_state(s) }).collect()
 }

@@ -156,8 +156,7 @@ fn connect(n: usize, pairs: &[(usize, usize)], found: &[pair::Placed]) -> Result
     let mut order = vec![0];
     while let Some(missing) = (0..n).find(|&s| pose[s].is_none()) {
         let open = |k: &usize| pose[pairs[*k].0].is_some() != pose[pairs[*k].1].is_some();
-        let agrees = |k: usize| found[k].share >= AGREES && found[k].score >= OVERLAPS;
-        let sure = |k: &usize| agrees(*k) && found[*k].second <= SECOND;
+        let sure = |k: &usize| found[*k].is_sure();
         let best = |filter: &dyn Fn(&usize) -> bool| {
             let candidates = (0..pairs.len()).filter(|k| open(k) && filter(k));
             candidates.max_by(|&a, &b| found[a].score.total_cmp(&found[b].score).then(b.cmp(&a)))
@@ -167,7 +166,7 @@ fn connect(n: usize, pairs: &[(usize, usize)], found: &[pair::Placed]) -> Result
             let (r, s) = pairs.get(k).copied().unwrap_or((0, missing));
             let (state, other) = if pose[r].is_some() { (s, r) } else { (r, s) };
             let f = &found[k];
-            return Err(if !agrees(k) {
+            return Err(if !f.agrees() {
                 let share = if f.share < AGREES { f.share } else { f.score.max(0.0) };
                 PrepareError::Apart { state, other, percent: 100.0 * share }
             } else {
@@ -193,7 +192,7 @@ fn connect(n: usize, pairs: &[(usize, usize)], found: &[pair::Placed]) -> Result
 
 /// How far apart the pairs by themselves and all states together are, over the pairs that agree.
 fn circle(pairs: &[(usize, usize)], found: &[pair::Placed], common: &[Pose]) -> (f64, f64) {
-    let sure = pairs.iter().zip(found).filter(|(_, f)| f.share >= AGREES && f.second <= SECOND);
+    let sure = pairs.iter().zip(found).filter(|(_, f)| f.is_sure());
     sure.fold((0.0, 0.0), |(turn, shift), (&(r, s), f)| {
         let together = common[r].inverse() * common[s];
         let off = together * f.pose.inverse();

@@ -1,7 +1,7 @@
 //! Two scans: where one stands in the frame of the other, and how sure that is.
 
 use super::votes::{Upright, places};
-use super::{Freedom, balanced, fine};
+use super::{AGREES, Freedom, OVERLAPS, SECOND, balanced, fine};
 use crate::error::PrepareError;
 use crate::scan::Scan;
 use glam::{DQuat, DVec3, Vec3};
@@ -36,6 +36,18 @@ pub(super) struct Placed {
     pub recorded: f64,
     /// The middle of the source, in the target's frame.
     pub centre: DVec3,
+}
+
+impl Placed {
+    /// Whether enough is seen by both scans, and agrees.
+    pub fn agrees(&self) -> bool {
+        self.share >= AGREES && self.score >= OVERLAPS
+    }
+
+    /// Whether it does so here alone.
+    pub fn is_sure(&self) -> bool {
+        self.agrees() && self.second <= SECOND
+    }
 }
 
 /// Finds where `source` stands in the frame of `target`.
