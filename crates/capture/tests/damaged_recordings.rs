@@ -131,6 +131,20 @@ const CASES: &[Case] = &[
     }),
     ("state_is_text", "field-type", Fixed, |d| d.json(|v| v["frames"][5]["state"] = json!("open"))),
     ("state_is_negative", "field-type", Fixed, |d| d.json(|v| v["frames"][5]["state"] = json!(-1))),
+    ("depth_unit_of_one_state", "depth-unit", Error, |d| {
+        d.frames(|f| {
+            if f["state"] == 1 {
+                f["depth_unit_scale_factor"] = json!(10.0 * f["depth_unit_scale_factor"].as_f64().unwrap())
+            }
+        })
+    }),
+    ("millimetres_called_metres", "depth-unit", Error, |d| {
+        d.json(|v| v["metric"] = json!(true));
+        d.frames(|f| {
+            f["depth_unit_scale_factor"] = json!(1e3 * f["depth_unit_scale_factor"].as_f64().unwrap());
+            columns(f, |c, x| if c == 3 { 1e3 * x } else { x });
+        })
+    }),
     ("states_with_a_gap", "states-gap", Fixed, |d| {
         d.frames(|f| {
             if f["state"] == 2 {
@@ -253,7 +267,7 @@ const CASES: &[Case] = &[
             }
         })
     }),
-    ("the_masks_of_a_state_are_full", "state-unmasked", Fixed, |d| {
+    ("the_masks_of_a_state_are_full", "state-unmasked", Error, |d| {
         let v: Value = serde_json::from_str(&d.text()).unwrap();
         let frames = v["frames"].as_array().unwrap();
         (0..frames.len()).filter(|&i| frames[i]["state"] == 1).for_each(|i| image(&d.file(i, "mask_path"), |_| 255));

@@ -73,4 +73,13 @@ fn a_scan_upside_down_is_turned() {
             assert!((is - should).abs() < 0.01, "{}: {is}, should be {should}", t["file_path"]);
         }
     }
+    // One scan's depth in another unit: two ways to lie, it was said, or that little agrees.
+    let path = dir.join("scan_2/transforms.json");
+    let mut scan = read("scan_2");
+    for f in scan["frames"].as_array_mut().unwrap() {
+        let unit = f["depth_unit_scale_factor"].as_f64().unwrap();
+        f["depth_unit_scale_factor"] = (0.1 * unit).into();
+    }
+    std::fs::write(path, scan.to_string()).unwrap();
+    hingecast(dir, "import scan_0 scan_1 scan_2 -o other -q").refused("depth is in the wrong unit", "state 2");
 }

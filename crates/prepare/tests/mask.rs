@@ -2,8 +2,8 @@
 
 mod common;
 
-use common::{cameras, cupboard, picture, room, views};
-use glam::DVec3;
+use common::{Block, block, cameras, cupboard, picture, room, views};
+use glam::{DQuat, DVec3};
 use hingecast_geom::{Pose, Progress};
 use hingecast_prepare::{PrepareError, Wanted, object_masks};
 
@@ -62,4 +62,37 @@ fn a_person_says_what_the_object_is() {
     let mut states: Vec<_> = (0..2).map(|k| views(&scene, &Pose::IDENTITY, 12, k as u64)).collect();
     let nothing = object_masks(&mut states, &Wanted::At([0.0, -0.6, 1.2]), false, DVec3::Z, 0, &Progress::default());
     assert!(matches!(nothing, Err(PrepareError::NothingThere)));
+}
+
+/// What is not one whole object is said to be so: masks of clutter beside it came without a word.
+#[test]
+fn masks_of_more_or_less_than_one_thing_are_doubted() {
+    // A crate stands alone at first, later against the open door.
+    let crate_at = [[-0.9, -0.6, 0.1], [-0.5, -0.2, 0.1]];
+    let scene = |k: usize| {
+        let clutter = block(crate_at[k / 2], [0.3, 0.3, 0.4], 30.0);
+        [room(), vec![clutter], cupboard(30.0 * k as f64, Pose::IDENTITY)].concat()
+    };
+    let doubts = |wanted: Wanted, scene: &dyn Fn(usize) -> Vec<Block>| {
+        let mut states: Vec<_> = (0..4).map(|k| views(&scene(k), &Pose::IDENTITY, 10, k as u64)).collect();
+        object_masks(&mut states, &wanted, false, DVec3::Z, 0, &Progress::default()).unwrap().report.doubts
+    };
+    let found = doubts(Wanted::Moving, &scene);
+    assert!(found.len() == 1 && found[0].contains("1 of 4 states, first in state 2"), "{found:?}");
+    let found = doubts(Wanted::InBox([-2.0, -2.0, -0.2], [2.0, 2.0, 2.5]), &scene);
+    assert!(found.len() == 1 && found[0].contains("2 things that do not touch"), "{found:?}");
+    let found = doubts(Wanted::InBox([-0.4, 0.1, -0.1], [0.6, 1.2, 1.0]), &scene);
+    assert!(found.len() == 1 && found[0].contains("cuts through what it holds"), "{found:?}");
+    // On rough ground, which is no plane.
+    let mut rng = fastrand::Rng::with_seed(3);
+    let stone = |k: i32| {
+        let at = [0.3 * f64::from(k % 12 - 6), 0.3 * f64::from(k / 12 - 6), 0.5 * rng.f64() - 0.4];
+        let mut stone = block(at, [0.32, 0.32, 0.6], 0.0);
+        let tilt = DVec3::new(rng.f64() - 0.5, rng.f64() - 0.5, 0.0);
+        stone.world_from_block.rot = DQuat::from_scaled_axis(1.2 * tilt);
+        stone
+    };
+    let ground: Vec<Block> = (0..144).map(stone).collect();
+    let found = doubts(Wanted::Moving, &|k| [ground.clone(), cupboard(30.0 * k as f64, Pose::IDENTITY)].concat());
+    assert!(found.iter().any(|d| d.contains("neither floor nor wall")), "{found:?}");
 }

@@ -153,3 +153,22 @@ fn a_drawer_is_no_base() {
     let shift = (off.apply(MIDDLE) - MIDDLE).length();
     assert!(off.angle().to_degrees() < 0.05 && shift < 0.001, "{} deg, {shift} m", off.angle().to_degrees());
 }
+
+/// Pushed once, and then the drawer is pulled out: against the recorded place alone it was taken for the base,
+/// and the chest for pushed anew in every state.
+#[test]
+fn what_was_pushed_stays_there() {
+    let push = Pose::new(DQuat::from_rotation_z(0.035), DVec3::new(0.036, -0.048, 0.0));
+    let mut states: Vec<_> = [0.02, 0.02, 0.14, 0.26, 0.34]
+        .into_iter()
+        .enumerate()
+        .map(|(k, out)| masked(chest(out, if k == 0 { Pose::IDENTITY } else { push }), k as u64))
+        .collect();
+    let found = steady(&mut states, DVec3::Z, 0, &Progress::default()).unwrap();
+    for (state, pose) in found.iter().enumerate().skip(1) {
+        let off = *pose * pushed(push);
+        let (turn, shift) = (off.angle().to_degrees(), (off.apply(MIDDLE) - MIDDLE).length());
+        println!("state {state}: {turn} deg, {shift} m");
+        assert!(turn < 0.05 && shift < 0.001, "state {state}: off by {turn} deg, {shift} m");
+    }
+}

@@ -10,6 +10,7 @@ mod fix;
 mod motion;
 mod pixels;
 mod space;
+mod unit;
 
 pub(crate) use fix::backup;
 pub use fix::{Fix, fix};

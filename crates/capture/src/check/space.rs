@@ -8,16 +8,8 @@ use crate::{CaptureError, Recording, Split};
 use glam::{DMat3, DVec3};
 use hingecast_geom::Camera;
 
-/// Factors by which depth units are mistaken: metres, centimetres, millimetres, tenths, RealSense
-/// and TUM units.
-const UNITS: [f64; 10] = [1e-4, 1e-3, 1e-2, 0.1, 0.2, 5.0, 10.0, 100.0, 1e3, 1e4];
 /// Views of a state that are compared with each other.
 const VIEWS: usize = 8;
-/// Share of points that must land on the object in another view when all is well; below the second
-/// all is not.
-const AGREES: f64 = 0.7;
-const DISAGREES: f64 = 0.5;
-
 /// Findings, and how much of their surface states share ([`CheckReport::shared`](super::CheckReport)).
 pub(super) fn check(
     documents: &[Document],
@@ -38,8 +30,9 @@ pub(super) fn check(
     }
     empty_depth(documents, recording, looks, out);
     let by_state: Vec<Vec<usize>> = (0..recording.n_states).map(|s| some_views(recording, looks, s)).collect();
-    if let Some(finding) = depth_unit(recording, looks, &by_state) {
-        out.push(finding);
+    let wrong = super::unit::check(recording, looks, &by_state);
+    if !wrong.is_empty() {
+        out.extend(wrong);
         return Vec::new();
     }
     super::apart::views(documents, recording, looks, out);
@@ -127,13 +120,14 @@ fn some_views(recording: &Recording, looks: &[Option<Look>], state: usize) -> Ve
 /// How points fare in another view: on the object's silhouette; at the depth that is seen there;
 /// all.
 #[derive(Default)]
-struct Fate {
-    on_object: usize,
-    on_surface: usize,
-    all: usize,
+pub(super) struct Fate {
+    pub on_object: usize,
+    pub on_surface: usize,
+    pub all: usize,
 }
 
-fn carry(points: &[DVec3], look: &Look, camera: &Camera, scale: f64, tolerance: f64, fate: &mut Fate) {
+/// Looks where points of one view lie in another.
+pub(super) fn carry(points: &[DVec3], look: &Look, camera: &Camera, scale: f64, tolerance: f64, fate: &mut Fate) {
     for &x in points {
         let (uv, z) = camera.project(x);
         fate.all += 1;
@@ -143,46 +137,6 @@ fn carry(points: &[DVec3], look: &Look, camera: &Camera, scale: f64, tolerance: 
         let hit = if look.has_mask { look.object[i] == 1 } else { seen > 0.0 && (seen - z).abs() < 0.1 * z };
         fate.on_object += usize::from(hit);
         fate.on_surface += usize::from(look.object[i] == 1 && seen > 0.0 && (seen - z).abs() < tolerance);
-    }
-}
-
-/// Depth in the wrong unit: points of one view miss the object in the others, and hit it at another
-/// scale.
-fn depth_unit(recording: &Recording, looks: &[Option<Look>], by_state: &[Vec<usize>]) -> Option<Finding> {
-    let score = |scale: f64| {
-        let mut fate = Fate::default();
-        // Three states are enough, the unit is one for all.
-        for views in by_state.iter().take(3) {
-            for &i in views {
-                let from = looks[i].as_ref()?.points(&recording.frames[i].camera, scale);
-                for &j in views.iter().filter(|&&j| j != i) {
-                    carry(&from, looks[j].as_ref()?, &recording.frames[j].camera, scale, 0.0, &mut fate);
-                }
-            }
-        }
-        (fate.all > 50).then(|| fate.on_object as f64 / fate.all as f64)
-    };
-    let now = score(1.0)?;
-    if now >= DISAGREES {
-        return None;
-    }
-    let place = format!("{}: depth_unit_scale_factor", recording.root.display());
-    let best = UNITS.iter().filter_map(|&u| Some((u, score(u)?))).max_by(|a, b| a.1.total_cmp(&b.1));
-    match best {
-        Some((unit, share)) if share >= AGREES => {
-            let what = format!("depth is in the wrong unit: it agrees between views when multiplied by {unit}");
-            let place = format!("{place} = {}", recording.frames[by_state[0][0]].depth_scale);
-            let hint = "multiply depth_unit_scale_factor by that";
-            let e = CaptureError::new(what, place, hint);
-            Some(Finding { fix: Some(Fix::ScaleDepth { factor: unit }), ..error("depth-unit", e) })
-        }
-        _ => {
-            let what =
-                format!("depth and camera poses disagree: {:.0} % of points miss the object", 100.0 * (1.0 - now));
-            let hint =
-                "check poses and intrinsics (camera-to-world, OpenGL axes), and that depth is z and not ray length";
-            Some(Finding { severity: Severity::Error, ..warning("views-disagree", what, place, hint) })
-        }
     }
 }
 

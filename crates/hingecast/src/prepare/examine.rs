@@ -57,3 +57,10 @@ pub(crate) fn before_build(recording: &Recording, seed: u64, progress: &Progress
     }
     Ok(report.findings.iter().any(|f| f.code == APART && f.severity == Severity::Warning))
 }
+
+/// What else may keep scans from coming together: a finding that explains it better than `found` does.
+pub(super) fn or_why(found: Failure, recording: &Recording, progress: &Progress) -> Failure {
+    let Ok(report) = look_over(&recording.root, progress) else { return found };
+    let why = report.grave().next().map(|f| Failure::new(f.what.clone(), f.place.clone(), f.hint.clone()));
+    why.unwrap_or(found)
+}

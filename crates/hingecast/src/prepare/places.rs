@@ -1,5 +1,6 @@
 //! Where cameras, states and the object stand: what is corrected in a recording, and kept beside it.
 
+use super::examine::or_why;
 use super::raw_depths::RawDepths;
 use super::words::{AGREE_WELL, failure};
 use crate::failure::Result;
@@ -66,7 +67,10 @@ pub fn register(recording: &mut Recording, seed: u64, progress: &Progress) -> Re
         }
         other => other,
     };
-    let found = found.map_err(|e| failure(e, recording))?;
+    let found = found.map_err(|e| match e {
+        PrepareError::Cancelled(_) | PrepareError::Depths(_) => failure(e, recording),
+        e => or_why(failure(e, recording), recording, progress),
+    })?;
     apply(recording, &found.common_from_state);
     recording.registered = true;
     Ok(found)

@@ -9,6 +9,7 @@ mod changed;
 mod pieces;
 mod pixels;
 mod planes;
+mod whole;
 
 pub(crate) use pixels::{around, without_blobs};
 
@@ -114,7 +115,7 @@ pub fn object_masks(
     if count < FEW_MOVED && *wanted == Wanted::Moving {
         return Err(PrepareError::NothingMoved { samples: count });
     }
-    let mut supports = planes::supports(&room, up.as_vec3(), seed);
+    let mut supports = planes::supports(&room, wanted, up.as_vec3(), seed);
     planes::widen(&mut supports, &depths.views(0)?, lattice.voxel);
     let mut pieces = Pieces::new(lattice);
     if film {
@@ -127,8 +128,15 @@ pub fn object_masks(
         pieces.add(&depths.views(state)?, &supports);
     }
     let mut doubts = Vec::new();
+    if supports.is_empty() {
+        doubts.push("neither floor nor wall was found: they are in the masks, if there are any".into());
+    }
     let object = match wanted {
-        Wanted::InBox(lo, hi) => pieces.inside((*lo).into(), (*hi).into()).ok_or(PrepareError::NothingThere)?,
+        Wanted::InBox(lo, hi) => {
+            let (lo, hi) = ((*lo).into(), (*hi).into());
+            whole::boxed(&pieces, lo, hi, &mut doubts);
+            pieces.inside(lo, hi).ok_or(PrepareError::NothingThere)?
+        }
         Wanted::At(x) => pieces.at((*x).into()).ok_or(PrepareError::NothingThere)?,
         Wanted::Moving => {
             let (object, share) = pieces.object(&room, &mut doubts);
@@ -141,6 +149,10 @@ pub fn object_masks(
             object
         }
     };
+    // A person's box may well hold several.
+    if !matches!(wanted, Wanted::InBox(..)) {
+        whole::falls_apart(&pieces, &object, &mut doubts);
+    }
     let mut masks = Vec::new();
     let mut shares = Vec::new();
     for state in 0..n {

@@ -33,8 +33,10 @@ const JUMP: f32 = 4.0;
 
 /// Cells with something in them that is not the room's.
 pub(super) struct Pieces {
-    lattice: Lattice,
+    pub lattice: Lattice,
     counts: Vec<u16>,
+    /// Of every state: cells with enough pixels of its own.
+    pub states: Vec<Vec<usize>>,
 }
 
 /// The cells of the object.
@@ -45,7 +47,7 @@ pub(super) struct Object {
 
 impl Pieces {
     pub fn new(lattice: Lattice) -> Self {
-        Self { lattice, counts: vec![0; lattice.len()] }
+        Self { lattice, counts: vec![0; lattice.len()], states: Vec::new() }
     }
 
     /// Counts the pixels of a state's views in cells that most of its views see surface in; not
@@ -78,9 +80,14 @@ impl Pieces {
             let seen = f64::from(seen_by.count_ones()) >= SEEN * (on + through) as f64;
             on >= through && (seen || supports.iter().all(|p| p.height(middle) > CLOSE * p.widest()))
         });
+        let mut of_state = Vec::new();
         for (c, (count, _)) in believed.collect::<Vec<_>>() {
             self.counts[c] = self.counts[c].saturating_add(count);
+            if count >= PIXELS {
+                of_state.push(c);
+            }
         }
+        self.states.push(of_state);
     }
 
     /// Everything in a box that is not the room's; `None` where nothing is.
@@ -143,32 +150,14 @@ impl Pieces {
     }
 
     /// The piece of every cell, from 1, 0 where nothing is; and how many there are.
-    fn pieces(&self) -> (Vec<u32>, u32) {
+    pub fn pieces(&self) -> (Vec<u32>, u32) {
         let firm = self.firm();
-        let full = |i: usize| self.counts[i] >= firm;
-        let mut piece = vec![0u32; self.counts.len()];
-        let mut count = 0;
-        for start in 0..piece.len() {
-            if piece[start] > 0 || !full(start) {
-                continue;
-            }
-            count += 1;
-            piece[start] = count;
-            let mut open = vec![start];
-            while let Some(i) = open.pop() {
-                for j in self.around(i, TOUCH) {
-                    if piece[j] == 0 && full(j) {
-                        piece[j] = count;
-                        open.push(j);
-                    }
-                }
-            }
-        }
+        let (mut piece, count) = joined(&self.lattice, TOUCH, |i| self.counts[i] >= firm);
         // Cells that few pixels hit - a door seen slantwise - go with those around them.
         for _ in 0..ROUNDS {
             let joins = |i: usize| {
                 let free = piece[i] == 0 && self.counts[i] > 0;
-                free.then(|| self.around(i, 1).map(|j| piece[j]).filter(|p| *p > 0).min()).flatten()
+                free.then(|| around(&self.lattice, i, 1).map(|j| piece[j]).filter(|p| *p > 0).min()).flatten()
             };
             let joined: Vec<(usize, u32)> = (0..piece.len()).filter_map(|i| Some((i, joins(i)?))).collect();
             joined.into_iter().for_each(|(i, p)| piece[i] = p);
@@ -176,18 +165,42 @@ impl Pieces {
         (piece, count)
     }
 
-    /// Cells at most `reach` away along every axis, in order.
-    fn around(&self, i: usize, reach: i32) -> impl Iterator<Item = usize> + '_ {
-        let (at, n) = (self.lattice.coords(i), 2 * reach + 1);
-        let offsets = (0..n * n * n).map(move |k| IVec3::new(k % n, k / n % n, k / (n * n)) - reach);
-        offsets.filter_map(move |o| self.lattice.index_of(at + o))
-    }
-
     /// The cells of some pieces.
     fn grown(&self, piece: &[u32], own: &[bool]) -> Object {
         let cells = piece.iter().map(|p| own[*p as usize]).collect();
         Object { lattice: self.lattice, cells }
     }
+}
+
+/// The piece of every cell that is `full`, from 1, and 0 elsewhere; and how many there are. Cells at most
+/// `touch` apart along every axis hang together.
+pub(super) fn joined(lattice: &Lattice, touch: i32, full: impl Fn(usize) -> bool) -> (Vec<u32>, u32) {
+    let mut piece = vec![0u32; lattice.len()];
+    let mut count = 0;
+    for start in 0..piece.len() {
+        if piece[start] > 0 || !full(start) {
+            continue;
+        }
+        count += 1;
+        piece[start] = count;
+        let mut open = vec![start];
+        while let Some(i) = open.pop() {
+            for j in around(lattice, i, touch) {
+                if piece[j] == 0 && full(j) {
+                    piece[j] = count;
+                    open.push(j);
+                }
+            }
+        }
+    }
+    (piece, count)
+}
+
+/// Cells at most `reach` away along every axis, in order.
+fn around(lattice: &Lattice, i: usize, reach: i32) -> impl Iterator<Item = usize> + '_ {
+    let (at, n) = (lattice.coords(i), 2 * reach + 1);
+    let offsets = (0..n * n * n).map(move |k| IVec3::new(k % n, k / n % n, k / (n * n)) - reach);
+    offsets.filter_map(move |o| lattice.index_of(at + o))
 }
 
 /// Whether a pixel hangs between the surfaces beside it.

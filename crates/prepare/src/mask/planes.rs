@@ -1,6 +1,6 @@
 //! Floor, table, wall: large flat surfaces with everything that moves on one side of them.
 
-use super::{Room, place};
+use super::{Room, Wanted, place};
 use glam::{DMat3, DVec3, Vec3};
 use hingecast_articulate::DepthView;
 use nalgebra::Matrix3;
@@ -76,8 +76,8 @@ fn bin(z: f32) -> i32 {
     (z.max(1e-6).ln() / 0.2).floor() as i32
 }
 
-/// The planes of the room.
-pub(super) fn supports(room: &Room, up: Vec3, seed: u64) -> Vec<Plane> {
+/// The planes of the room. None has what is `wanted` behind it.
+pub(super) fn supports(room: &Room, wanted: &Wanted, up: Vec3, seed: u64) -> Vec<Plane> {
     let voxel = room.lattice.voxel;
     let (mut still, mut moved) = (Vec::new(), Vec::new());
     for (cloud, m) in room.clouds.iter().zip(&room.moved) {
@@ -96,7 +96,8 @@ pub(super) fn supports(room: &Room, up: Vec3, seed: u64) -> Vec<Plane> {
         }
         let points: Vec<Vec3> = members.iter().map(|&i| still[i].0).collect();
         let lies_on = |other: &Plane| plane.lies_on(other, &points, voxel);
-        if is_support(&plane, &points, &moved, &all, up, voxel) && !out.iter().any(lies_on) {
+        let before = !is_behind(&plane, wanted, &moved, &all, voxel);
+        if before && is_support(&plane, &points, &moved, &all, up, voxel) && !out.iter().any(lies_on) {
             out.push(plane);
         }
         let mut taken = members.into_iter().peekable();
@@ -187,11 +188,23 @@ fn fitted(points: impl Iterator<Item = Vec3>, towards: Vec3) -> (Vec3, f32) {
     (n.as_vec3(), n.dot(centre) as f32)
 }
 
+/// Whether what is wanted lies behind a plane: what moved; half of what is in the box; the place.
+fn is_behind(plane: &Plane, wanted: &Wanted, moved: &[Vec3], all: &[Vec3], voxel: f32) -> bool {
+    let behind = |x: &Vec3| plane.height(*x) < -DEEP * voxel;
+    let share = |points: &[Vec3]| points.iter().filter(|x| behind(x)).count() as f64 / points.len().max(1) as f64;
+    share(moved) > BEHIND
+        || match wanted {
+            Wanted::Moving => false,
+            Wanted::InBox(lo, hi) => {
+                let (lo, hi) = (Vec3::from(*lo), Vec3::from(*hi));
+                let held = all.iter().filter(|x| x.cmpge(lo).all() && x.cmple(hi).all());
+                share(&held.copied().collect::<Vec<_>>()) > 0.5
+            }
+            Wanted::At(x) => behind(&Vec3::from(*x)),
+        }
+}
+
 fn is_support(plane: &Plane, points: &[Vec3], moved: &[Vec3], all: &[Vec3], up: Vec3, voxel: f32) -> bool {
-    let behind = moved.iter().filter(|x| plane.height(**x) < -DEEP * voxel).count();
-    if behind as f64 > BEHIND * moved.len() as f64 {
-        return false;
-    }
     let up_along = up - plane.normal * up.dot(plane.normal);
     let a =
         up_along.try_normalize().filter(|_| up_along.length() > 0.1).unwrap_or(plane.normal.any_orthonormal_vector());

@@ -1,0 +1,65 @@
+//! Whether what was found is one thing, and not a room or several things.
+
+use super::pieces::{Object, Pieces, joined};
+use glam::Vec3;
+
+/// Cells of one state farther apart than this, along an axis, do not touch: it is seen less densely than all.
+const TOUCH: i32 = 3;
+/// A piece with less than this share of the cells is no matter.
+const PIECE: f64 = 0.08;
+/// A box that leaves out this share of a thing cuts it.
+const CUT: f64 = 0.08;
+
+/// Names states in which the object alone falls apart: a thing that stood against it in another state.
+pub(super) fn falls_apart(pieces: &Pieces, object: &Object, doubts: &mut Vec<String>) {
+    let apart = |state: &usize| {
+        let mut own = vec![false; object.cells.len()];
+        pieces.states[*state].iter().filter(|i| object.cells[**i]).for_each(|i| own[*i] = true);
+        let (piece, count) = joined(&pieces.lattice, TOUCH, |i| own[i]);
+        large(&piece, count, |_| true) > 1
+    };
+    let n = pieces.states.len();
+    let states: Vec<usize> = (0..n).filter(apart).collect();
+    if let Some(first) = states.first() {
+        doubts.push(format!(
+            "in {} of {n} states, first in state {first}, the object is in pieces that do not touch: is a thing in its masks \
+             that stood against it in another state?",
+            states.len()
+        ));
+    }
+}
+
+/// What a box holds: several things, or a part of one.
+pub(super) fn boxed(pieces: &Pieces, lo: Vec3, hi: Vec3, doubts: &mut Vec<String>) {
+    let (piece, count) = pieces.pieces();
+    let inside = |i: usize| {
+        let middle = pieces.lattice.centre(pieces.lattice.coords(i));
+        middle.cmpge(lo).all() && middle.cmple(hi).all()
+    };
+    let things = large(&piece, count, inside);
+    if things > 1 {
+        doubts.push(format!("the box holds {things} things that do not touch; all are taken for the object"));
+    }
+    let (mut cut, mut whole) = (vec![0usize; count as usize + 1], vec![0usize; count as usize + 1]);
+    for (i, p) in piece.iter().enumerate().filter(|(_, p)| **p > 0) {
+        whole[*p as usize] += 1;
+        cut[*p as usize] += usize::from(!inside(i));
+    }
+    // Of the thing that the box holds most of.
+    let most = (1..whole.len()).max_by_key(|p| whole[*p] - cut[*p]);
+    let share = most.map_or(0.0, |p| cut[p] as f64 / whole[p].max(1) as f64);
+    if share > CUT {
+        doubts.push(format!(
+            "the box cuts through what it holds: {:.0} % of it, over all states, is outside and left out",
+            100.0 * share
+        ));
+    }
+}
+
+/// Pieces with a share of the cells that counts.
+fn large(piece: &[u32], count: u32, own: impl Fn(usize) -> bool) -> usize {
+    let mut cells = vec![0usize; count as usize + 1];
+    piece.iter().enumerate().filter(|(i, p)| **p > 0 && own(*i)).for_each(|(_, p)| cells[*p as usize] += 1);
+    let all: usize = cells.iter().sum();
+    cells.iter().filter(|c| **c as f64 >= PIECE * all.max(1) as f64).count()
+}
