@@ -170,8 +170,8 @@ impl fmt::Display for Doubt {
             ),
             Self::MayBeOneWith { joint, other } => write!(
                 f,
-                "joint '{joint}' turns about the line of '{other}', and moves only where that does: the two may be the \
-                 sides of one part"
+                "joint '{joint}' has the axis of '{other}', lies beside it and moves only where that does: the two may be \
+                 the sides of one part"
             ),
             Self::Contradicted { joint, states } => write!(
                 f,

@@ -10,7 +10,7 @@ use crate::observe::evidence::Evidence;
 use crate::score::compare::REFUTED_NATS;
 use crate::shadow::{reach, shadows};
 use crate::shown::Shown;
-use glam::{IVec3, Vec3};
+use glam::{DVec3, IVec3, Vec3};
 use hingecast_geom::{Certainty, Joint};
 use std::collections::HashMap;
 
@@ -56,7 +56,7 @@ pub fn weigh_doubts(
     }
     let pairs: Vec<usize> = believed.shown.iter().map(|s| s.pairs).collect();
     let reach =
-        |j: usize, along: usize| reach(&found.owners.members(evidence, tree.joints[j].child), &tree.joints[along]);
+        |j: usize, from: DVec3, line: DVec3| reach(&found.owners.members(evidence, tree.joints[j].child), from, line);
     let shadows = shadows(&tree.joints, &reach, &pairs, evidence.lattice.voxel);
     for (j, joint) in tree.joints.iter().enumerate() {
         let name = || joint.name.clone();

@@ -4,7 +4,7 @@ use super::{Room, Wanted, place};
 use glam::{DMat3, DVec3, Vec3};
 use hingecast_articulate::DepthView;
 use nalgebra::Matrix3;
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
 /// Planes that are sought.
 const MOST: usize = 8;
@@ -26,6 +26,12 @@ const COVERS: f32 = 0.5;
 const EVERY: usize = 13;
 const NEAR: f32 = 2.5;
 const FEW: usize = 50;
+/// No plane's own samples are taken to be farther off than this, voxels. One whose are, and which fills less
+/// than this share of its extent, in patches of so many voxels, is the fronts of several things, by chance in
+/// line.
+const BLURRED: f32 = 1.5;
+const FILLED: f32 = 0.7;
+const PATCH: f32 = 3.0;
 
 /// A thing lies on a plane if its top is at least so many tolerances of it before it, and not more than so
 /// many voxels.
@@ -147,7 +153,7 @@ fn largest(samples: &[(Vec3, Vec3)], voxel: f32, rng: &mut fastrand::Rng) -> Opt
 fn tolerance(mut off: Vec<f32>, voxel: f32) -> f32 {
     let middle = off.len() / 2;
     let median = *off.select_nth_unstable_by(middle, f32::total_cmp).1;
-    (5.0 * median).clamp(0.3 * voxel, 1.5 * voxel)
+    (5.0 * median).clamp(0.3 * voxel, BLURRED * voxel)
 }
 
 /// Widens the planes to what single pixels are off: samples are means of many.
@@ -211,6 +217,9 @@ fn is_support(plane: &Plane, points: &[Vec3], moved: &[Vec3], all: &[Vec3], up: 
     let sides = [a, plane.normal.cross(a)];
     let size = |points: &[Vec3]| sides.map(|s| spread(points, s));
     let (own, seed, seen) = (size(points), size(moved), size(all));
+    if plane.tolerance >= BLURRED * voxel && filled(points, sides, voxel) < FILLED * own[0] * own[1] {
+        return false;
+    }
     let larger = own[0] * own[1] > LARGER * seed[0] * seed[1];
     // Under the lowest of all, whatever its size: the floor may be seen in patches only.
     let lowest = plane.normal.dot(up) > 0.9 && {
@@ -218,6 +227,14 @@ fn is_support(plane: &Plane, points: &[Vec3], moved: &[Vec3], all: &[Vec3], up: 
         (below as f64) < BEHIND * all.len() as f64
     };
     larger && (lowest || (0..2).all(|k| own[k] > COVERS * seen[k]))
+}
+
+/// Area in which there are points, along two directions.
+fn filled(points: &[Vec3], sides: [Vec3; 2], voxel: f32) -> f32 {
+    let edge = PATCH * voxel;
+    let patch = |x: &Vec3| sides.map(|s| (x.dot(s) / edge).floor() as i32);
+    let patches: BTreeSet<[i32; 2]> = points.iter().map(patch).collect();
+    patches.len() as f32 * edge * edge
 }
 
 /// Length along a direction, without the outermost hundredths.

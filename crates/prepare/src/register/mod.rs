@@ -10,6 +10,7 @@ mod balanced;
 pub(crate) mod fine;
 mod level;
 mod pair;
+mod place;
 mod steady;
 mod votes;
 
