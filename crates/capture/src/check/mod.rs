@@ -5,6 +5,7 @@
 //! masks and states agree with each other in space.
 
 mod apart;
+mod carry;
 mod description;
 mod fix;
 mod motion;

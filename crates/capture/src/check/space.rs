@@ -1,12 +1,12 @@
 //! Do cameras, depth, masks and states agree in space? Points of one view are carried into other
 //! views.
 
+use super::carry::{Fate, carry};
 use super::pixels::Look;
 use super::{Finding, Fix, Severity, address, error, warning};
 use crate::recording::transforms::Document;
 use crate::{CaptureError, Recording, Split};
 use glam::{DMat3, DVec3};
-use hingecast_geom::Camera;
 
 /// Views of a state that are compared with each other.
 const VIEWS: usize = 8;
@@ -115,29 +115,6 @@ fn some_views(recording: &Recording, looks: &[Option<Look>], state: usize) -> Ve
         .collect();
     let n = all.len().min(VIEWS);
     (0..n).map(|k| all[k * all.len() / n]).collect()
-}
-
-/// How points fare in another view: on the object's silhouette; at the depth that is seen there;
-/// all.
-#[derive(Default)]
-pub(super) struct Fate {
-    pub on_object: usize,
-    pub on_surface: usize,
-    pub all: usize,
-}
-
-/// Looks where points of one view lie in another.
-pub(super) fn carry(points: &[DVec3], look: &Look, camera: &Camera, scale: f64, tolerance: f64, fate: &mut Fate) {
-    for &x in points {
-        let (uv, z) = camera.project(x);
-        fate.all += 1;
-        let Some(i) = look.pixel(uv).filter(|_| z > 0.0) else { continue };
-        let seen = f64::from(look.depth[i]) * scale;
-        // Without masks everything is object: then only depth can agree.
-        let hit = if look.has_mask { look.object[i] == 1 } else { seen > 0.0 && (seen - z).abs() < 0.1 * z };
-        fate.on_object += usize::from(hit);
-        fate.on_surface += usize::from(look.object[i] == 1 && seen > 0.0 && (seen - z).abs() < tolerance);
-    }
 }
 
 /// A state whose cloud lies elsewhere as a whole: its points meet the surfaces of no other state,

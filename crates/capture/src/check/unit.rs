@@ -1,7 +1,7 @@
 //! Is depth in the unit of the poses, and is that what the recording says?
 
+use super::carry::{Fate, carry};
 use super::pixels::Look;
-use super::space::{Fate, carry};
 use super::{Finding, Fix, error};
 use crate::{CaptureError, Recording};
 
