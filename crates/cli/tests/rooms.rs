@@ -16,6 +16,9 @@ fn scans_with_a_world_each_and_no_masks_become_a_twin() {
     let said = built.stderr.clone();
     assert!(said.contains("brought into one frame") && said.contains("no masks"), "{said}");
     assert!(said.contains("was taken to stand") && said.contains("brought back"), "the push is named: {said}");
+    // Once, for all states after it.
+    let prepared = std::fs::read_to_string(dir.join("run/prepare/prepare.json")).unwrap();
+    assert_eq!(prepared.matches("was taken to stand").count(), 1, "{prepared}");
     assert!(dir.join("run/prepare/masks.png").is_file());
     hingecast(dir, "eval run --truth rec.truth").done();
     let figures: serde_json::Value =

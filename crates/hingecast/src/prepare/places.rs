@@ -84,8 +84,13 @@ pub(super) fn apply(recording: &mut Recording, common_from_state: &[Pose]) {
     }
 }
 
+/// Pushes of states one after the other that differ by less than so many degrees, and by less than this share
+/// of how far they are, are one.
+const ALIKE_DEG: f64 = 0.3;
+const ALIKE: f64 = 0.1;
+
 /// Brings states in which the object as a whole stands elsewhere back to where it stood. Answers by what,
-/// and a doubt for each.
+/// and a doubt for each place.
 pub(super) fn take_pushes_out(
     recording: &mut Recording,
     seed: u64,
@@ -98,14 +103,29 @@ pub(super) fn take_pushes_out(
         return Ok((Vec::new(), Vec::new()));
     }
     let middle = depths.middle()?;
-    let pushed = pushes.iter().enumerate().filter(|(_, p)| **p != Pose::IDENTITY);
-    let doubts = pushed.map(|(state, push)| {
-        let far = (push.apply(middle) - middle).length();
+    let far = |push: &Pose| (push.apply(middle) - middle).length();
+    // What was pushed stays there: one doubt for all the states after it.
+    let mut stays: Vec<(usize, usize)> = Vec::new();
+    for state in (0..pushes.len()).filter(|s| pushes[*s] != Pose::IDENTITY) {
+        let alike = |since: usize| {
+            let between = pushes[since].inverse() * pushes[state];
+            between.angle().to_degrees() < ALIKE_DEG && far(&between) < ALIKE * far(&pushes[state])
+        };
+        match stays.last_mut() {
+            Some((first, last)) if *last + 1 == state && alike(*first) => *last = state,
+            _ => stays.push((state, state)),
+        }
+    }
+    let doubts = stays.into_iter().map(|(first, last)| {
+        let (far, turn) = (far(&pushes[first]), pushes[first].angle().to_degrees());
         let far = if recording.metric { format!("{:.0} mm", 1e3 * far) } else { format!("{far:.3} scene units") };
-        let turn = push.angle().to_degrees();
+        let (states, leave) = match first == last {
+            true => (format!("state {first}"), "that state"),
+            false => (format!("states {first} to {last}"), "those states"),
+        };
         format!(
-            "state {state}: the object as a whole was taken to stand {far} and {turn:.1} deg elsewhere, pushed, and brought \
-             back; if it stood still, leave that state out"
+            "{states}: the object as a whole was taken to stand {far} and {turn:.1} deg elsewhere, pushed, and brought back; if \
+             it stood still, leave {leave} out"
         )
     });
     let doubts = doubts.collect();
