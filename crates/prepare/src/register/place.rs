@@ -26,6 +26,8 @@ const EARNED_FINELY: f64 = 1.15;
 /// stayed.
 const CLEARLY: f64 = 2.5;
 const STANDS: f64 = 0.05;
+/// Of two places, the one that turns less is believed if it explains this share of what the other does.
+const NEARLY: f64 = 0.8;
 /// Rounds in which a place is settled finely, and samples of that.
 const ROUNDS: usize = 24;
 const SAMPLES: usize = 4000;
@@ -135,7 +137,14 @@ impl<'a> Place<'a> {
         let far = CLEARLY * f64::from(within);
         let count = |on: &[bool]| on.iter().filter(|o| **o).count();
         let upright = tried.iter().map(|(pose, _)| pose).filter(|pose| self.stays_down(pose));
-        let best = upright.map(|pose| (self.on(pose, within), *pose)).max_by_key(|(on, _)| count(on));
+        let places: Vec<(Vec<bool>, Pose)> = upright.map(|pose| (self.on(pose, within), *pose)).collect();
+        let most = places.iter().map(|(on, _)| count(on)).max().unwrap_or(0) as f64;
+        // A door that opened by little takes more surface with it than is seen of a fridge: of what is nearly
+        // as good, that which turns least is believed.
+        let turn = |pose: &Pose| (*pose * home.inverse()).angle();
+        let nearly = || places.iter().filter(|(on, _)| count(on) as f64 >= NEARLY * most);
+        let least = nearly().map(|(_, pose)| turn(pose)).fold(f64::INFINITY, f64::min);
+        let best = nearly().filter(|(_, pose)| turn(pose) < least + STRAIGHT).max_by_key(|(on, _)| count(on)).cloned();
         let Some((best_on, best)) = best.filter(|(on, _)| count(on) >= FEW) else { return home };
         // What stands still has drifted a little at most: a push must beat the place that is found from
         // home, too.
