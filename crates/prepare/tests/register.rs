@@ -129,8 +129,7 @@ fn a_push_is_taken_out_and_a_door_is_not() {
         let found = steady(&mut states, DVec3::Z, 0, &Progress::default()).unwrap();
         for (state, common_from_state) in found.iter().enumerate() {
             let stood = if state < 2 { Pose::IDENTITY } else { pushed(push) };
-            let off = *common_from_state * stood;
-            let (turn, shift) = (off.angle().to_degrees(), (off.apply(MIDDLE) - MIDDLE).length());
+            let (turn, shift) = off(*common_from_state, stood);
             println!("{mm} mm {deg} deg state {state}: {turn:.4} deg {shift:.5} m");
             assert!(turn < 0.05 && shift < 0.001, "{mm} mm, state {state}: off by {turn} deg, {shift} m");
             assert!(mm > 0.0 || *common_from_state == Pose::IDENTITY, "nobody pushed: {common_from_state:?}");
@@ -138,20 +137,27 @@ fn a_push_is_taken_out_and_a_door_is_not() {
     }
 }
 
+/// A chest with its drawer so far out in each state, pushed in state `first` and left there.
+fn chests(out: [f64; 5], first: usize, push: Pose) -> Vec<Vec<hingecast_articulate::DepthView>> {
+    let stood = |k: usize| if k < first { Pose::IDENTITY } else { push };
+    (0..5).map(|k| masked(chest(out[k], stood(k)), k as u64)).collect()
+}
+
+/// How far a state is off that `stood` there: degrees, and the shift of the middle, m.
+fn off(found: Pose, stood: Pose) -> (f64, f64) {
+    let off = found * stood;
+    (off.angle().to_degrees(), (off.apply(MIDDLE) - MIDDLE).length())
+}
+
 /// A drawer that is nearly as far out as before lies well on itself: it is not the base for that.
 #[test]
 fn a_drawer_is_no_base() {
     let push = Pose::new(DQuat::from_rotation_z(0.035), DVec3::new(0.018, -0.024, 0.0));
-    let mut states: Vec<_> = [0.0, 0.1, 0.2, 0.26, 0.34]
-        .into_iter()
-        .enumerate()
-        .map(|(k, out)| masked(chest(out, if k < 4 { Pose::IDENTITY } else { push }), k as u64))
-        .collect();
+    let mut states = chests([0.0, 0.1, 0.2, 0.26, 0.34], 4, push);
     let found = steady(&mut states, DVec3::Z, 0, &Progress::default()).unwrap();
     assert!(found[..4].iter().all(|p| *p == Pose::IDENTITY), "nobody pushed: {found:?}");
-    let off = found[4] * pushed(push);
-    let shift = (off.apply(MIDDLE) - MIDDLE).length();
-    assert!(off.angle().to_degrees() < 0.05 && shift < 0.001, "{} deg, {shift} m", off.angle().to_degrees());
+    let (turn, shift) = off(found[4], pushed(push));
+    assert!(turn < 0.05 && shift < 0.001, "{turn} deg, {shift} m");
 }
 
 /// Pushed once, and then the drawer is pulled out: against the recorded place alone it was taken for the base,
@@ -159,15 +165,10 @@ fn a_drawer_is_no_base() {
 #[test]
 fn what_was_pushed_stays_there() {
     let push = Pose::new(DQuat::from_rotation_z(0.035), DVec3::new(0.036, -0.048, 0.0));
-    let mut states: Vec<_> = [0.02, 0.02, 0.14, 0.26, 0.34]
-        .into_iter()
-        .enumerate()
-        .map(|(k, out)| masked(chest(out, if k == 0 { Pose::IDENTITY } else { push }), k as u64))
-        .collect();
+    let mut states = chests([0.02, 0.02, 0.14, 0.26, 0.34], 1, push);
     let found = steady(&mut states, DVec3::Z, 0, &Progress::default()).unwrap();
     for (state, pose) in found.iter().enumerate().skip(1) {
-        let off = *pose * pushed(push);
-        let (turn, shift) = (off.angle().to_degrees(), (off.apply(MIDDLE) - MIDDLE).length());
+        let (turn, shift) = off(*pose, pushed(push));
         println!("state {state}: {turn} deg, {shift} m");
         assert!(turn < 0.05 && shift < 0.001, "state {state}: off by {turn} deg, {shift} m");
     }

@@ -103,18 +103,18 @@ pub fn fix(path: &Path, report: &CheckReport) -> Result<Vec<String>, CaptureErro
             "find the common cause in the findings (a wrong folder, a broken export) and repair that",
         ));
     }
-    let left = |state: usize, all: bool| {
-        let of_state = |d: &&transforms::Document, index: usize| all || !dropped.contains(&(d.file.clone(), index));
-        let entries = documents.iter().flat_map(|d| d.entries.iter().map(move |e| (d, e)));
-        entries.filter(|(d, e)| e.state == state && e.split == Split::Train && of_state(d, e.index)).count()
-    };
-    let states: BTreeSet<usize> = documents.iter().flat_map(|d| &d.entries).map(|e| e.state).collect();
-    if let Some(state) = states.into_iter().find(|s| left(*s, true) > 0 && left(*s, false) == 0) {
+    // Training frames of every state: all, and those that would be left.
+    let mut frames = BTreeMap::<usize, (usize, usize)>::new();
+    for (d, e) in documents.iter().flat_map(|d| d.entries.iter().map(move |e| (d, e))) {
+        if e.split == Split::Train {
+            let (all, left) = frames.entry(e.state).or_default();
+            *all += 1;
+            *left += usize::from(!dropped.contains(&(d.file.clone(), e.index)));
+        }
+    }
+    if let Some((state, (all, _))) = frames.into_iter().find(|(_, (_, left))| *left == 0) {
         return Err(CaptureError::new(
-            format!(
-                "all {} training frames of state {state} would have to be dropped; nothing was changed",
-                left(state, true)
-            ),
+            format!("all {all} training frames of state {state} would have to be dropped; nothing was changed"),
             path.display().to_string(),
             "find their common cause in the findings and repair that; or take the state's frames out of transforms.json",
         ));

@@ -3,6 +3,7 @@
 use super::carry::{Fate, carry};
 use super::pixels::Look;
 use super::{Finding, Fix, error};
+use crate::recording::stray::median;
 use crate::{CaptureError, Recording};
 
 /// Factors by which depth units are mistaken: metres, centimetres, millimetres, tenths, RealSense
@@ -68,7 +69,8 @@ pub(super) fn check(recording: &Recording, looks: &[Option<Look>], by_state: &[V
         }
         finding
     };
-    wrong.iter().take(if all { 1 } else { wrong.len() }).map(finding).collect()
+    let named = if all { &wrong[..1] } else { &wrong };
+    named.iter().map(finding).collect()
 }
 
 /// Depth and poses agree, and both are millimetres, say, in a recording that says metres.
@@ -76,17 +78,16 @@ fn not_metres(recording: &Recording, looks: &[Option<Look>], by_state: &[Vec<usi
     if !recording.metric {
         return None;
     }
-    let known = |&i: &usize| looks[i].iter().flat_map(|look| &look.depth).copied().filter(|z| *z > 0.0);
-    let mut depth: Vec<f32> = by_state.iter().flatten().flat_map(|i| known(i).collect::<Vec<_>>()).collect();
-    let middle = depth.len() / 2;
+    let looked = by_state.iter().flatten().filter_map(|&i| looks[i].as_ref());
+    let depth: Vec<f64> = looked.flat_map(|look| &look.depth).map(|z| f64::from(*z)).filter(|z| *z > 0.0).collect();
     if depth.len() < FEW {
         return None;
     }
-    let median = f64::from(*depth.select_nth_unstable_by(middle, f32::total_cmp).1);
-    if (METRES[0]..METRES[1]).contains(&median) {
+    let far = median(depth);
+    if (METRES[0]..METRES[1]).contains(&far) {
         return None;
     }
-    let what = format!("the recording says that it is metric, and what it shows is {median:.3} metres away");
+    let what = format!("the recording says that it is metric, and what it shows is {far:.3} metres away");
     let place = format!("{}: metric = true", recording.root.display());
     let hint = "bring depth and poses to metres (millimetres are a common mistake), or say \"metric\": false";
     Some(error("depth-unit", CaptureError::new(what, place, hint)))

@@ -51,16 +51,19 @@ pub fn check(path: &Path, seed: u64, progress: &Progress) -> Result<CheckReport>
 /// A finding that makes the build worthless, with the advice; the wish to stop.
 pub(crate) fn before_build(recording: &Recording, seed: u64, progress: &Progress) -> Result<bool> {
     let report = check(&recording.root, seed, progress)?;
-    if let Some(f) = report.grave().next() {
-        let hint = format!("{}; `--force` builds all the same", f.hint);
-        return Err(Failure::new(f.what.clone(), f.place.clone(), hint));
+    if let Some(why) = gravest(&report) {
+        let hint = format!("{}; `--force` builds all the same", why.hint);
+        return Err(Failure { hint, ..why });
     }
     Ok(report.findings.iter().any(|f| f.code == APART && f.severity == Severity::Warning))
 }
 
 /// What else may keep scans from coming together: a finding that explains it better than `found` does.
 pub(super) fn or_why(found: Failure, recording: &Recording, progress: &Progress) -> Failure {
-    let Ok(report) = look_over(&recording.root, progress) else { return found };
-    let why = report.grave().next().map(|f| Failure::new(f.what.clone(), f.place.clone(), f.hint.clone()));
-    why.unwrap_or(found)
+    look_over(&recording.root, progress).ok().and_then(|report| gravest(&report)).unwrap_or(found)
+}
+
+/// The first finding that makes a build worthless.
+fn gravest(report: &CheckReport) -> Option<Failure> {
+    report.grave().next().map(|f| Failure::new(f.what.clone(), f.place.clone(), f.hint.clone()))
 }

@@ -90,10 +90,15 @@ impl Pieces {
         self.states.push(of_state);
     }
 
+    /// Whether the middle of a cell is in a box.
+    pub fn in_box(&self, i: usize, lo: Vec3, hi: Vec3) -> bool {
+        let middle = self.lattice.centre(self.lattice.coords(i));
+        middle.cmpge(lo).all() && middle.cmple(hi).all()
+    }
+
     /// Everything in a box that is not the room's; `None` where nothing is.
     pub fn inside(&self, lo: Vec3, hi: Vec3) -> Option<Object> {
-        let middle = |i: usize| self.lattice.centre(self.lattice.coords(i));
-        let own = |i: usize| self.counts[i] > 0 && middle(i).cmpge(lo).all() && middle(i).cmple(hi).all();
+        let own = |i: usize| self.counts[i] > 0 && self.in_box(i, lo, hi);
         let cells: Vec<bool> = (0..self.counts.len()).map(own).collect();
         cells.contains(&true).then_some(Object { lattice: self.lattice, cells })
     }

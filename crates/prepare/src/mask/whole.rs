@@ -16,7 +16,7 @@ pub(super) fn falls_apart(pieces: &Pieces, object: &Object, doubts: &mut Vec<Str
         let mut own = vec![false; object.cells.len()];
         pieces.states[*state].iter().filter(|i| object.cells[**i]).for_each(|i| own[*i] = true);
         let (piece, count) = joined(&pieces.lattice, TOUCH, |i| own[i]);
-        large(&piece, count, |_| true) > 1
+        large(&sizes(&piece, count, |_| true)) > 1
     };
     let n = pieces.states.len();
     let states: Vec<usize> = (0..n).filter(apart).collect();
@@ -32,22 +32,15 @@ pub(super) fn falls_apart(pieces: &Pieces, object: &Object, doubts: &mut Vec<Str
 /// What a box holds: several things, or a part of one.
 pub(super) fn boxed(pieces: &Pieces, lo: Vec3, hi: Vec3, doubts: &mut Vec<String>) {
     let (piece, count) = pieces.pieces();
-    let inside = |i: usize| {
-        let middle = pieces.lattice.centre(pieces.lattice.coords(i));
-        middle.cmpge(lo).all() && middle.cmple(hi).all()
-    };
-    let things = large(&piece, count, inside);
+    let whole = sizes(&piece, count, |_| true);
+    let held = sizes(&piece, count, |i| pieces.in_box(i, lo, hi));
+    let things = large(&held);
     if things > 1 {
         doubts.push(format!("the box holds {things} things that do not touch; all are taken for the object"));
     }
-    let (mut cut, mut whole) = (vec![0usize; count as usize + 1], vec![0usize; count as usize + 1]);
-    for (i, p) in piece.iter().enumerate().filter(|(_, p)| **p > 0) {
-        whole[*p as usize] += 1;
-        cut[*p as usize] += usize::from(!inside(i));
-    }
     // Of the thing that the box holds most of.
-    let most = (1..whole.len()).max_by_key(|p| whole[*p] - cut[*p]);
-    let share = most.map_or(0.0, |p| cut[p] as f64 / whole[p].max(1) as f64);
+    let most = (1..held.len()).max_by_key(|p| held[*p]);
+    let share = most.map_or(0.0, |p| (whole[p] - held[p]) as f64 / whole[p].max(1) as f64);
     if share > CUT {
         doubts.push(format!(
             "the box cuts through what it holds: {:.0} % of it, over all states, is outside and left out",
@@ -56,10 +49,15 @@ pub(super) fn boxed(pieces: &Pieces, lo: Vec3, hi: Vec3, doubts: &mut Vec<String
     }
 }
 
-/// Pieces with a share of the cells that counts.
-fn large(piece: &[u32], count: u32, own: impl Fn(usize) -> bool) -> usize {
+/// How many cells of every piece count; 0 of what is no piece.
+fn sizes(piece: &[u32], count: u32, counts: impl Fn(usize) -> bool) -> Vec<usize> {
     let mut cells = vec![0usize; count as usize + 1];
-    piece.iter().enumerate().filter(|(i, p)| **p > 0 && own(*i)).for_each(|(_, p)| cells[*p as usize] += 1);
-    let all: usize = cells.iter().sum();
-    cells.iter().filter(|c| **c as f64 >= PIECE * all.max(1) as f64).count()
+    piece.iter().enumerate().filter(|(i, p)| **p > 0 && counts(*i)).for_each(|(_, p)| cells[*p as usize] += 1);
+    cells
+}
+
+/// How many pieces have a share of the cells that matters.
+fn large(sizes: &[usize]) -> usize {
+    let all: usize = sizes.iter().sum();
+    sizes.iter().filter(|c| **c as f64 >= PIECE * all.max(1) as f64).count()
 }

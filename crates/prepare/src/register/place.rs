@@ -39,16 +39,21 @@ pub(super) fn side(scan: &Scan) -> f64 {
     f64::from(scan.voxel()) * f64::from(scan.space.lattice.size.max_element())
 }
 
+/// The middle of some points.
+fn middle(points: &[Vec3]) -> DVec3 {
+    (points.iter().sum::<Vec3>() / points.len().max(1) as f32).as_dvec3()
+}
+
 /// Whether what is pushed like that stays upright and on its floor, within so many times what is allowed.
 pub(super) fn stays_down(pose: &Pose, points: &[Vec3], side: f64, up: DVec3, times: f64) -> bool {
-    let middle = (points.iter().sum::<Vec3>() / points.len().max(1) as f32).as_dvec3();
+    let middle = middle(points);
     let rise = (pose.apply(middle) - middle).dot(up);
     pose.rotate(up).angle_between(up) < times * TILT && rise.abs() < times * RISE * side
 }
 
 /// The nearest place that keeps it upright and on its floor.
 pub(super) fn put_down(pose: &Pose, points: &[Vec3], up: DVec3) -> Pose {
-    let middle = (points.iter().sum::<Vec3>() / points.len().max(1) as f32).as_dvec3();
+    let middle = middle(points);
     let there = pose.apply(middle);
     let rot = DQuat::from_rotation_arc(pose.rotate(up), up) * pose.rot;
     let there = there - (there - middle).dot(up) * up;
@@ -114,29 +119,30 @@ impl<'a> Place<'a> {
         stays_down(pose, &self.even.points, side(self.scan), self.up, 1.0)
     }
 
+    /// The places that some starts lead to, and how close to the states before a sample lies on them there.
+    fn tried<'b>(&self, starts: impl Iterator<Item = &'b Pose>) -> (Vec<Pose>, f32) {
+        let (places, noise): (Vec<Pose>, Vec<f64>) = starts.map(|p| self.settled(p)).unzip();
+        (places, fine::on(self.scan.fine_voxel, noise.into_iter().fold(f64::INFINITY, f64::min)))
+    }
+
     /// Where the object was last: the recorded place, or the best of those where states before were `brought`.
     pub fn home(&self, brought: &[Pose]) -> Pose {
         if brought.is_empty() {
             return Pose::IDENTITY;
         }
-        let tried: Vec<(Pose, f64)> =
-            std::iter::once(&Pose::IDENTITY).chain(brought).map(|p| self.settled(p)).collect();
-        let noise = tried.iter().map(|t| t.1).fold(f64::INFINITY, f64::min);
-        let within = fine::on(self.scan.fine_voxel, noise);
+        let (tried, within) = self.tried(std::iter::once(&Pose::IDENTITY).chain(brought.iter().rev()));
         let count = |pose: &Pose| self.on(pose, within).into_iter().filter(|on| *on).count();
-        let placed = tried[1..].iter().map(|t| t.0).filter(|pose| self.stays_down(pose));
-        let best = placed.map(|pose| (count(&pose), pose)).max_by_key(|(on, _)| *on);
+        let placed = tried[1..].iter().filter(|pose| self.stays_down(pose));
+        let best = placed.map(|pose| (count(pose), *pose)).max_by_key(|(on, _)| *on);
         best.filter(|(on, _)| *on > count(&Pose::IDENTITY)).map_or(Pose::IDENTITY, |(_, pose)| pose)
     }
 
     /// `home`, unless one of the candidates is clearly better.
     pub fn better(&self, home: Pose, candidates: &[Pose]) -> Pose {
-        let tried: Vec<(Pose, f64)> = std::iter::once(&home).chain(candidates).map(|p| self.settled(p)).collect();
-        let noise = tried.iter().map(|t| t.1).fold(f64::INFINITY, f64::min);
-        let within = fine::on(self.scan.fine_voxel, noise);
+        let (tried, within) = self.tried(std::iter::once(&home).chain(candidates));
         let far = CLEARLY * f64::from(within);
         let count = |on: &[bool]| on.iter().filter(|o| **o).count();
-        let upright = tried.iter().map(|(pose, _)| pose).filter(|pose| self.stays_down(pose));
+        let upright = tried.iter().filter(|pose| self.stays_down(pose));
         let places: Vec<(Vec<bool>, Pose)> = upright.map(|pose| (self.on(pose, within), *pose)).collect();
         let most = places.iter().map(|(on, _)| count(on)).max().unwrap_or(0) as f64;
         // A door that opened by little takes more surface with it than is seen of a fridge: of what is nearly
@@ -148,7 +154,7 @@ impl<'a> Place<'a> {
         let Some((best_on, best)) = best.filter(|(on, _)| count(on) >= FEW) else { return home };
         // What stands still has drifted a little at most: a push must beat the place that is found from
         // home, too.
-        let near = tried[0].0;
+        let near = tried[0];
         let found_near = farthest(&best, &near, &self.even.points) < far;
         let enough = match found_near {
             true => EARNED_FINELY,

@@ -25,7 +25,8 @@ const COMPARED: usize = 4;
 /// Largest push: turn, radians, and shift, shares of the scan's longest side.
 const TURN: f64 = 0.25;
 const SHIFT: f64 = 0.2;
-/// The same, times so many, before a place is settled finely.
+/// What is pushed stays upright and on its floor within so many times what is allowed, before its place is
+/// settled finely.
 const LOOSELY: f64 = 2.0;
 /// Places that are settled finely.
 const FINALISTS: usize = 6;
@@ -52,9 +53,18 @@ pub fn steady(depths: &mut dyn Depths, up: DVec3, seed: u64, progress: &Progress
         if before.is_empty() {
             continue;
         }
-        let known: Vec<Pose> = out[..s].to_vec();
-        let candidates = candidates(scan, &before, &known, up, seed);
-        out[s] = placed(scan, &before, &known, &candidates, up, seed);
+        let mut brought: Vec<Pose> = Vec::new();
+        for pose in out[..s].iter().filter(|p| **p != Pose::IDENTITY) {
+            if !brought.contains(pose) {
+                brought.push(*pose);
+            }
+        }
+        let candidates = candidates(scan, &before, &brought, up, seed);
+        // What is pushed stays there: home is where it was recorded or where a state before was brought, whichever
+        // is better, and another place must be clearly better than that. (Drawers pulled out after a push look like
+        // another push, against the recorded place alone.)
+        let place = Place::new(scan, &before, up, seed);
+        out[s] = place.better(place.home(&brought), &candidates);
     }
     Ok(out)
 }
@@ -65,9 +75,9 @@ fn compared(s: usize) -> impl Iterator<Item = usize> {
     std::iter::once(0).chain(last..s)
 }
 
-/// Places that may be right: where states before stand, and where samples vote for; those that agree
+/// Places that may be right: where states before were `brought`, and where samples vote for; those that agree
 /// with most come first.
-fn candidates(scan: &Scan, before: &[(&Scan, Pose)], known: &[Pose], up: DVec3, seed: u64) -> Vec<Pose> {
+fn candidates(scan: &Scan, before: &[(&Scan, Pose)], brought: &[Pose], up: DVec3, seed: u64) -> Vec<Pose> {
     let own = Judges::by_surface(scan);
     let voxel = scan.voxel();
     let side = side(scan);
@@ -80,12 +90,7 @@ fn candidates(scan: &Scan, before: &[(&Scan, Pose)], known: &[Pose], up: DVec3, 
         };
         before.iter().zip(&others).map(one).sum()
     };
-    let mut out: Vec<Pose> = Vec::new();
-    for pose in known.iter().filter(|p| **p != Pose::IDENTITY) {
-        if !out.contains(pose) {
-            out.push(*pose);
-        }
-    }
+    let mut out = brought.to_vec();
     for (other, theirs) in before {
         let (from, to) = (voters(scan, turn, seed), voters(other, turn, seed ^ 1));
         let voted = places(&from, &to, 4.0 * voxel, 8 * PLACES).into_iter().map(|p| back * p * there);
@@ -107,20 +112,4 @@ fn candidates(scan: &Scan, before: &[(&Scan, Pose)], known: &[Pose], up: DVec3, 
         }
     }
     few
-}
-
-/// The place at which most samples lie exactly on those of the states before. What is pushed stays there: home
-/// is where it was recorded or where a state before was brought, whichever is better, and another place must
-/// be clearly better than that. (Drawers pulled out after a push look like another push, against the recorded
-/// place alone.)
-fn placed(scan: &Scan, before: &[(&Scan, Pose)], known: &[Pose], candidates: &[Pose], up: DVec3, seed: u64) -> Pose {
-    let place = Place::new(scan, before, up, seed);
-    let mut brought: Vec<Pose> = Vec::new();
-    for pose in known.iter().rev().filter(|p| **p != Pose::IDENTITY) {
-        if !brought.contains(pose) {
-            brought.push(*pose);
-        }
-    }
-    let home = place.home(&brought);
-    place.better(home, candidates)
 }
