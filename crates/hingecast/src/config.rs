@@ -173,6 +173,7 @@ impl Config {
             ("twin.max_hulls", self.twin.max_hulls as f64, (1.0, 1024.0), "hulls"),
             ("twin.simplify_error", self.twin.simplify_error, share, "share of the diagonal"),
             ("twin.color_views", self.twin.color_views as f64, from(1), "images"),
+            ("twin.max_texels", self.twin.max_texels as f64, (0.0, 64e6), "texels"),
             ("twin.crumbs", self.twin.crumbs, share, "share of the largest piece"),
         ];
         match checks.into_iter().find(|(_, value, (lo, hi), _)| !(value >= lo && value <= hi)) {

@@ -150,7 +150,7 @@ pub fn import(source: &Path, out: &Path, config: &ImportConfig, progress: &Progr
             let doubt = doubt
                 .filter(|d| d.contains("guessed"))
                 .map(|_| format!("part '{name}': mass guessed, it has no collision piece"));
-            Ok((PartModel { name: name.clone(), mesh, hulls, inertial }, doubt))
+            Ok((PartModel { name: name.clone(), mesh, texture: None, hulls, inertial }, doubt))
         })
         .collect::<Result<_>>()?;
     let (mut parts, doubts): (Vec<PartModel>, Vec<Option<String>>) = parts.into_iter().unzip();

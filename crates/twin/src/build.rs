@@ -1,9 +1,10 @@
 //! The stage: observations and tree in, [`Twin`] out.
 
 use crate::field::Field;
+use crate::vertices::Points;
 use crate::{
     Inertial, Observation, PartModel, Twin, clearance, color, fuse, hulls, mass, separate, simplify, snap, solid,
-    surface, vertices,
+    surface, texture, vertices,
 };
 use glam::{DMat3, DVec3};
 use hingecast_geom::{Cancelled, KinematicTree, Pose, Progress, TriMesh};
@@ -28,8 +29,10 @@ pub struct Config {
     /// Pieces of surface smaller than this share of the part's largest piece are dropped, unless
     /// views agree on them.
     pub crumbs: f64,
-    /// At most this many images colour the vertices.
+    /// At most this many images colour the surface.
     pub color_views: usize,
+    /// Texels of the picture of one part, at most; 0: colours of vertices alone.
+    pub max_texels: usize,
 }
 
 /// At most this many images say where the surface is exactly, and a pixel speaks for what lies
@@ -49,6 +52,7 @@ impl Default for Config {
             max_hulls: 48,
             crumbs: 0.02,
             color_views: 160,
+            max_texels: 4_000_000,
         }
     }
 }
@@ -61,7 +65,7 @@ pub struct Input<'a> {
     pub tree: &'a KinematicTree,
     /// States of the recording: a tree without joints does not tell.
     pub n_states: usize,
-    /// Number of observations; `load(i)` is called up to four times for each.
+    /// Number of observations; `load(i)` is called up to six times for each.
     pub n_observations: usize,
     /// Diagonal of the object's box in the first state, scene units.
     pub diagonal: f64,
@@ -109,7 +113,8 @@ pub fn build<E: From<Cancelled> + Send>(
     let mut meshes: Vec<TriMesh> = fields.par_iter().map(|f| f.as_ref().map_or_else(TriMesh::default, fine)).collect();
     // For mass and collision, where a sheet should stay as thick as the grid makes it.
     let thick: Vec<TriMesh> = meshes.par_iter().map(simple).collect();
-    let pulls = vertices::collect(&meshes, &poses, SNAP_VIEWS, &shown, &|pull, glimpse| {
+    let points: Vec<Points> = meshes.iter().map(Points::of).collect();
+    let pulls = vertices::collect(&points.iter().collect::<Vec<_>>(), &poses, SNAP_VIEWS, &shown, &|pull, glimpse| {
         snap::accumulate(pull, glimpse, SNAP_REACH * voxel);
     })?;
     meshes.iter_mut().zip(&pulls).for_each(|(mesh, pulls)| snap::finish(mesh, pulls, voxel));
@@ -128,10 +133,14 @@ pub fn build<E: From<Cancelled> + Send>(
         })
         .collect();
     drop(fields);
-    let sums = vertices::collect(&meshes, &poses, config.color_views, &shown, &|sum, glimpse| {
-        color::accumulate(sum, glimpse, 2.0 * voxel);
-    })?;
+    let points: Vec<Points> = meshes.iter().map(Points::of).collect();
+    let tolerance = 2.0 * voxel;
+    let sums =
+        vertices::collect(&points.iter().collect::<Vec<_>>(), &poses, config.color_views, &shown, &|sum, glimpse| {
+            color::accumulate(sum, glimpse, tolerance);
+        })?;
     meshes.iter_mut().zip(&sums).for_each(|(mesh, sums)| color::finish(mesh, sums));
+    let textures = texture::paint(&meshes, &sums, &poses, config, tolerance, &shown, progress)?;
 
     let hull_config = hulls::HullConfig { max_hulls: config.max_hulls, ..Default::default() };
     let decomposed: Vec<(Vec<TriMesh>, usize)> =
@@ -149,7 +158,8 @@ pub fn build<E: From<Cancelled> + Send>(
         ));
     }
     let mut parts = Vec::new();
-    for (part, (mesh, (hulls, dropped))) in meshes.into_iter().zip(pieces.into_iter().zip(flat)).enumerate() {
+    let surfaces = meshes.into_iter().zip(textures);
+    for (part, ((mesh, texture), (hulls, dropped))) in surfaces.zip(pieces.into_iter().zip(flat)).enumerate() {
         let name = &tree.parts[part];
         if mesh.is_empty() {
             doubts.push(format!("part '{name}' has no surface: no depth pixel carries its label"));
@@ -169,7 +179,7 @@ pub fn build<E: From<Cancelled> + Send>(
         if let Some(doubt) = doubt {
             doubts.push(format!("part '{name}': {doubt}"));
         }
-        parts.push(PartModel { name: name.clone(), mesh, hulls, inertial });
+        parts.push(PartModel { name: name.clone(), mesh, texture, hulls, inertial });
     }
     Ok(Twin {
         name: input.name.to_string(),

@@ -3,26 +3,41 @@
 use crate::vertices::Glimpse;
 use hingecast_geom::TriMesh;
 
-/// Adds what a pixel says to a vertex's `sum` (rgb and weight).
-/// It counts when it carries the part's label and its depth is the vertex's within `tolerance`.
-pub fn accumulate(sum: &mut [f32; 4], g: &Glimpse, tolerance: f32) {
+/// What the pixels that show a vertex say of it.
+#[derive(Clone, Copy, Default)]
+pub struct Sum {
+    rgb: [f32; 3],
+    weight: f32,
+    /// Pixels a scene unit of the surface, in the view that shows it best.
+    pub finest: f32,
+}
+
+/// Pixels that a scene unit of the surface has in this view, if the view shows the point: the pixel
+/// carries its part's label, and its depth is the point's within `tolerance`.
+pub fn shows(g: &Glimpse, tolerance: f32) -> Option<f32> {
     let (seen, p) = (g.seen, g.pixel);
     let facing = -g.normal.dot(g.x.normalize_or_zero());
-    if !(facing > 0.2) || seen.labels[p] != g.part || (seen.depth[p] - g.x.z).abs() > tolerance {
-        return;
-    }
+    let is = facing > 0.2 && seen.labels[p] == g.part && (seen.depth[p] - g.x.z).abs() <= tolerance;
+    is.then(|| facing * seen.camera.fx as f32 / g.x.z)
+}
+
+/// Adds what a pixel says to a vertex's `sum`.
+pub fn accumulate(sum: &mut Sum, g: &Glimpse, tolerance: f32) {
+    let Some(fineness) = shows(g, tolerance) else { return };
+    let facing = g.normal.dot(g.x.normalize_or_zero());
     let w = facing * facing;
     for k in 0..3 {
-        sum[k] += w * seen.rgb[3 * p + k] as f32;
+        sum.rgb[k] += w * g.seen.rgb[3 * g.pixel + k] as f32;
     }
-    sum[3] += w;
+    sum.weight += w;
+    sum.finest = sum.finest.max(fineness);
 }
 
 /// Turns the sums into colours; a vertex that nobody saw takes the mean of its coloured neighbours,
 /// else grey.
-pub fn finish(mesh: &mut TriMesh, sums: &[[f32; 4]]) {
+pub fn finish(mesh: &mut TriMesh, sums: &[Sum]) {
     let mut colors: Vec<Option<[f32; 3]>> =
-        sums.iter().map(|s| (s[3] > 0.0).then(|| [s[0] / s[3], s[1] / s[3], s[2] / s[3]])).collect();
+        sums.iter().map(|s| (s.weight > 0.0).then(|| s.rgb.map(|x| x / s.weight))).collect();
     for _ in 0..8 {
         let mut spread = vec![([0.0f32; 3], 0.0f32); colors.len()];
         for f in &mesh.faces {

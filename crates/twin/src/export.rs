@@ -5,8 +5,8 @@
 //! mass (revolute), at the centre of mass (prismatic), at the world origin (root). Mesh files are
 //! in link frames.
 
-use crate::link::{hull_file, link_origin, mean_color, visual_file};
-use crate::{PartModel, Twin, mjcf, urdf};
+use crate::link::{hull_file, link_origin, mean_color, texture_file, visual_file};
+use crate::{PartModel, Twin, mjcf, texture, urdf};
 use glam::{DVec3, Vec3};
 use hingecast_geom::ply::PlyError;
 use hingecast_geom::staging::{Staging, write_whole};
@@ -81,8 +81,8 @@ pub fn is_ours(path: &Path) -> bool {
     };
     match names.as_deref() {
         Some(["twin.json" | "robot.urdf" | "robot.xml"]) => true,
-        Some(["meshes", "visual", name]) => part(name, &[".obj", ".ply"]),
-        Some(["meshes", "collision", name]) => part(name, &[".stl"]),
+        Some(["meshes", "visual", name]) => part(name, &[".obj", ".mtl", ".png", ".ply"]),
+        Some(["meshes", "collision", name]) => part(name, &[".obj"]),
         Some(["splats", name]) => part(name, &[".ply"]),
         _ => false,
     }
@@ -97,12 +97,16 @@ fn write_part(dir: &Path, index: usize, part: &PartModel, origin: DVec3) -> Resu
     let meshes = dir.join("meshes");
     let path = meshes.join(visual_file(index));
     let visual = if part.mesh.is_empty() { placeholder() } else { local(&part.mesh) };
-    visual.write_obj(&path).map_err(|source| ExportError::Io { path: path.clone(), source })?;
+    match &part.texture {
+        Some(picture) => texture::files::write(&visual, picture, &path),
+        None => visual.write_obj(&path),
+    }
+    .map_err(|source| ExportError::Io { path: path.clone(), source })?;
     // The same surface as PLY: the format whose vertex colours every mesh viewer shows.
     visual.write_ply(&path.with_extension("ply"))?;
     for (k, hull) in part.hulls.iter().enumerate() {
         let path = meshes.join(hull_file(index, k));
-        local(hull).write_stl(&path).map_err(|source| ExportError::Io { path: path.clone(), source })?;
+        local(hull).write_obj(&path).map_err(|source| ExportError::Io { path: path.clone(), source })?;
     }
     Ok(())
 }
@@ -123,9 +127,12 @@ fn summary(twin: &Twin) -> serde_json::Value {
                 "name": p.name,
                 "link_origin": origin.to_array(),
                 "visual": format!("meshes/{}", visual_file(i)),
+                "texture": p.texture.as_ref().map(|_| format!("meshes/{}", texture_file(i))),
                 "collision": (0..p.hulls.len()).map(|k| format!("meshes/{}", hull_file(i, k))).collect::<Vec<_>>(),
                 "splats": format!("splats/part_{i}.ply"),
                 "mass": p.inertial.mass,
+                "com": p.inertial.com.to_array(),
+                "inertia": p.inertial.inertia.to_cols_array_2d(),
                 "faces": p.mesh.faces.len(),
                 "open_edges": p.mesh.open_edges(),
                 "volume": p.mesh.mass_integrals().volume,

@@ -76,6 +76,7 @@ mod slabs;
 mod snap;
 mod solid;
 pub mod surface;
+mod texture;
 mod thin;
 pub mod urdf;
 mod vertices;
@@ -83,6 +84,7 @@ mod xml;
 
 pub use build::{Config, build};
 pub use export::{ExportError, is_ours, write};
+pub use texture::Texture;
 
 use glam::{DMat3, DVec3};
 use hingecast_geom::{Camera, Certainty, KinematicTree, TriMesh};
@@ -134,6 +136,8 @@ pub struct PartModel {
     pub name: String,
     /// The surface as it is shown, with vertex colours; empty for a part that no view shows.
     pub mesh: TriMesh,
+    /// Photographs on it, where views show it.
+    pub texture: Option<Texture>,
     /// Convex pieces for collision.
     pub hulls: Vec<TriMesh>,
     /// Mass, centre of mass and inertia of the solid.

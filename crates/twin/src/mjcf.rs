@@ -1,7 +1,7 @@
 //! MJCF text of a twin: the same links and joints as the URDF, for MuJoCo.
 
 use crate::Twin;
-use crate::link::{damping, hull_file, link_origin, mean_color, touching, visual_file};
+use crate::link::{armature, damping, hull_file, link_origin, mean_color, texture_file, touching, visual_file};
 use crate::xml::{escape, xyz};
 use glam::DVec3;
 use hingecast_geom::JointKind;
@@ -11,12 +11,21 @@ use std::fmt::Write as _;
 pub fn to_string(twin: &Twin) -> String {
     let mut out = String::new();
     let _ = writeln!(out, "<mujoco model=\"{}\">", escape(&twin.name));
-    let _ = writeln!(out, "  <compiler angle=\"radian\" meshdir=\"meshes\" autolimits=\"true\"/>");
+    let _ =
+        writeln!(out, "  <compiler angle=\"radian\" meshdir=\"meshes\" texturedir=\"meshes\" autolimits=\"true\"/>");
     let _ = writeln!(out, "  <statistic extent=\"{:.6}\"/>", twin.diagonal);
     let _ = writeln!(out, "  <asset>");
     for (i, part) in twin.parts.iter().enumerate() {
         // "shell": a visual mesh need not enclose a volume; mass comes from <inertial>.
         let _ = writeln!(out, "    <mesh name=\"visual_{i}\" file=\"{}\" inertia=\"shell\"/>", visual_file(i));
+        if part.texture.is_some() {
+            let file = texture_file(i);
+            let _ = writeln!(out, "    <texture name=\"photo_{i}\" type=\"2d\" file=\"{file}\"/>");
+            let _ = writeln!(
+                out,
+                "    <material name=\"photo_{i}\" texture=\"photo_{i}\" specular=\"0\" shininess=\"0\"/>"
+            );
+        }
         for k in 0..part.hulls.len() {
             let _ = writeln!(out, "    <mesh name=\"hull_{i}_{k}\" file=\"{}\" inertia=\"convex\"/>", hull_file(i, k));
         }
@@ -78,22 +87,25 @@ fn body(twin: &Twin, part: usize, parent_origin: DVec3, depth: usize, out: &mut 
             };
             let _ = writeln!(
                 out,
-                "{pad}  <joint name=\"{}\" type=\"{kind}\" axis=\"{}\"{range} damping=\"{:.6e}\"/>",
+                "{pad}  <joint name=\"{}\" type=\"{kind}\" axis=\"{}\"{range} damping=\"{:.6e}\" armature=\"{:.6e}\"/>",
                 escape(&joint.name),
                 xyz(joint.screw.axis),
-                damping(twin, joint)
+                damping(twin, joint),
+                armature(twin, joint)
             );
         }
     }
     let [r, g, b] = mean_color(&model.mesh);
+    let plain = format!("rgba=\"{r:.4} {g:.4} {b:.4} 1\"");
+    let look = if model.texture.is_some() { format!("material=\"photo_{part}\"") } else { plain.clone() };
     let _ = writeln!(
         out,
-        "{pad}  <geom name=\"visual_{part}\" type=\"mesh\" mesh=\"visual_{part}\" contype=\"0\" conaffinity=\"0\" group=\"2\" density=\"0\" rgba=\"{r:.4} {g:.4} {b:.4} 1\"/>"
+        "{pad}  <geom name=\"visual_{part}\" type=\"mesh\" mesh=\"visual_{part}\" contype=\"0\" conaffinity=\"0\" group=\"2\" density=\"0\" {look}/>"
     );
     for k in 0..model.hulls.len() {
         let _ = writeln!(
             out,
-            "{pad}  <geom name=\"hull_{part}_{k}\" type=\"mesh\" mesh=\"hull_{part}_{k}\" group=\"3\" rgba=\"{r:.4} {g:.4} {b:.4} 1\"/>"
+            "{pad}  <geom name=\"hull_{part}_{k}\" type=\"mesh\" mesh=\"hull_{part}_{k}\" group=\"3\" {plain}/>"
         );
     }
     for joint in twin.tree.joints.iter().filter(|j| j.parent == part) {

@@ -7,13 +7,14 @@ use crate::xml::{escape, xyz};
 use hingecast_geom::JointKind;
 use std::fmt::Write as _;
 
-/// The `<mujoco>` element makes MuJoCo resolve the mesh paths as every other loader does.
+/// The `<mujoco>` element makes MuJoCo resolve the mesh paths as every other loader does, and keep the
+/// base, which it would melt into the world.
 pub fn to_string(twin: &Twin) -> String {
     let mut out = String::new();
     let _ = writeln!(out, "<?xml version=\"1.0\"?>\n<robot name=\"{}\">", escape(&twin.name));
     let _ = writeln!(
         out,
-        "  <mujoco><compiler meshdir=\".\" strippath=\"false\" discardvisual=\"true\" balanceinertia=\"true\"/></mujoco>"
+        "  <mujoco><compiler meshdir=\".\" strippath=\"false\" discardvisual=\"true\" fusestatic=\"false\" balanceinertia=\"true\"/></mujoco>"
     );
     for (i, part) in twin.parts.iter().enumerate() {
         let origin = link_origin(twin, i);
@@ -32,10 +33,16 @@ pub fn to_string(twin: &Twin) -> String {
             m.z_axis.y,
             m.z_axis.z
         );
-        let [r, g, b] = mean_color(&part.mesh);
+        // A material here would hide the one of the OBJ, and with it the photographs.
+        let material = if part.texture.is_some() {
+            String::new()
+        } else {
+            let [r, g, b] = mean_color(&part.mesh);
+            format!("<material name=\"color_{i}\"><color rgba=\"{r:.4} {g:.4} {b:.4} 1\"/></material>")
+        };
         let _ = writeln!(
             out,
-            "    <visual><geometry><mesh filename=\"{}\"/></geometry><material name=\"color_{i}\"><color rgba=\"{r:.4} {g:.4} {b:.4} 1\"/></material></visual>",
+            "    <visual><geometry><mesh filename=\"{}\"/></geometry>{material}</visual>",
             path(&visual_file(i))
         );
         for k in 0..part.hulls.len() {
