@@ -1,98 +1,21 @@
 //! A hollow box with a hinged lid, ray-cast analytically, fused and exported: sizes, masses and
 //! joints must come back.
 
-use glam::{DVec2, DVec3};
-use hingecast_geom::{Camera, Cancelled, Joint, JointKind, KinematicTree, Progress, Screw};
-use hingecast_twin::{BACKGROUND, Config, Observation, Twin, build, build::Input, write};
+mod common;
 
-/// Slabs of one part: lower and upper corner.
-type Slabs = Vec<(DVec3, DVec3)>;
+use common::{Slabs, observe, slabs};
+use glam::DVec3;
+use hingecast_geom::{Cancelled, KinematicTree, Progress};
+use hingecast_twin::{BACKGROUND, Config, Twin, build, build::Input, write};
 
-fn slabs() -> [Slabs; 2] {
-    let v = DVec3::new;
-    let t = 0.02;
-    let base = vec![
-        (v(-0.2, -0.15, 0.0), v(0.2, 0.15, t)),
-        (v(-0.2, -0.15, t), v(-0.2 + t, 0.15, 0.2)),
-        (v(0.2 - t, -0.15, t), v(0.2, 0.15, 0.2)),
-        (v(-0.2 + t, -0.15, t), v(0.2 - t, -0.15 + t, 0.2)),
-        (v(-0.2 + t, 0.15 - t, t), v(0.2 - t, 0.15, 0.2)),
-    ];
-    [base, vec![(v(-0.2, -0.15, 0.2), v(0.2, 0.15, 0.22))]]
+/// The base is red, the lid green.
+fn paint(part: usize, _: DVec3) -> [u8; 3] {
+    [[200, 0, 0], [0, 200, 0]][part]
 }
 
-fn tree() -> KinematicTree {
-    let screw = Screw { kind: JointKind::Revolute, axis: DVec3::NEG_Y, pivot: DVec3::new(-0.2, 0.0, 0.2) };
-    KinematicTree {
-        parts: vec!["base".into(), "lid".into()],
-        joints: vec![Joint {
-            name: "hinge".into(),
-            parent: 0,
-            child: 1,
-            screw,
-            values: vec![0.0, 0.5, 1.0, 1.5],
-            limits: [0.0, 1.5],
-        }],
-        ..Default::default()
-    }
-}
-
-fn ray_box(o: DVec3, d: DVec3, lo: DVec3, hi: DVec3) -> Option<f64> {
-    let (a, b) = ((lo - o) / d, (hi - o) / d);
-    let near = a.min(b).max_element();
-    let far = a.max(b).min_element();
-    (near <= far && near > 0.0).then_some(near)
-}
-
-fn observe(parts: &[Slabs; 2], state: usize, view: usize) -> Observation {
-    let angle = view as f64 * 2.4;
-    let height = 0.1 + 0.9 * (view as f64 + 0.5) / 24.0;
-    let ring = (1.0 - height * height).max(0.0).sqrt();
-    let target = DVec3::new(0.0, 0.0, 0.15);
-    let eye = target + 1.2 * DVec3::new(ring * angle.cos(), ring * angle.sin(), height);
-    let camera = Camera::look_at(eye, target, DVec3::Z, 160, 160, 0.7);
-    let poses = tree().poses_at(state);
-    let mut seen = Observation {
-        state,
-        camera,
-        depth: vec![0.0; 160 * 160],
-        labels: vec![BACKGROUND; 160 * 160],
-        rgb: vec![0; 3 * 160 * 160],
-    };
-    for i in 0..160 * 160 {
-        let d = camera.ray(DVec2::new((i % 160) as f64 + 0.5, (i / 160) as f64 + 0.5));
-        for (part, boxes) in parts.iter().enumerate() {
-            let back = poses[part].inverse();
-            for &(lo, hi) in boxes {
-                if let Some(z) = ray_box(back.apply(eye), back.rotate(d), lo, hi)
-                    && (seen.labels[i] == BACKGROUND || (z as f32) < seen.depth[i])
-                {
-                    seen.depth[i] = z as f32;
-                    seen.labels[i] = part as u8;
-                    seen.rgb[3 * i + part] = 200;
-                    seen.rgb[3 * i + 1 - part] = 0;
-                }
-            }
-        }
-    }
-    seen
-}
-
-/// From 24 views of each of the four states.
 fn twin_of(parts: &[Slabs; 2]) -> Twin {
-    let tree = tree();
-    let input = Input {
-        name: "box",
-        tree: &tree,
-        n_states: 4,
-        n_observations: 4 * 24,
-        diagonal: 0.55,
-        metric: true,
-        up: DVec3::Z,
-    };
-    let load = |i: usize| Ok::<_, Cancelled>(observe(parts, i / 24, i % 24));
-    let config = Config { voxel: 1.0 / 128.0, ..Default::default() };
-    build(&input, &load, &config, &Progress::default()).unwrap()
+    let config = Config { voxel: 1.0 / 128.0, max_texels: 0, ..Default::default() };
+    common::twin_of(&|state, view| observe(parts, &paint, state, view), &config)
 }
 
 /// A lid of a quarter of a voxel is whole, in its place, and as thin as it is.
@@ -128,6 +51,7 @@ fn sizes_masses_and_joints_come_back() {
     let inner = twin.parts[0].mesh.vertices.iter().filter(|v| v.x.abs() < 0.15 && v.y.abs() < 0.1);
     let top = inner.fold(f32::MIN, |a, v| a.max(v.z));
     assert!(top < 0.035, "the floor of the box is at 0.02, found {top}");
+    assert!(twin.parts.iter().all(|p| p.texture.is_none()), "no texels were asked for");
     // Colours went to the right parts.
     let lid = hingecast_twin::link::mean_color(&twin.parts[1].mesh);
     assert!(lid[1] > 0.5 && lid[0] < 0.2, "{lid:?}");
@@ -164,7 +88,7 @@ fn a_recording_in_which_no_part_was_found_to_move_has_a_twin_of_one_part() {
         up: DVec3::Z,
     };
     let load = |i: usize| {
-        let mut seen = observe(&slabs(), i / 8, 3 * (i % 8));
+        let mut seen = observe(&slabs(), &paint, i / 8, 3 * (i % 8));
         seen.labels.iter_mut().filter(|l| **l != BACKGROUND).for_each(|l| *l = 0);
         Ok::<_, Cancelled>(seen)
     };

@@ -1,0 +1,173 @@
+//! A box with a lid, painted with a pattern that no vertex colours could hold, photographed with
+//! exposures that differ: the texture shows the pattern, and its files are read by others.
+
+mod common;
+
+use common::{observe, slabs, twin_of};
+use glam::{DVec3, Vec2, Vec3};
+use hingecast_geom::TriMesh;
+use hingecast_twin::{Config, Observation, Texture, Twin, is_ours, write};
+
+/// Squares of 4 cm on all faces; the lid is blue where the base is red.
+fn squares(part: usize, x: DVec3) -> [u8; 3] {
+    let dark = edge(x).iter().map(|(cell, _)| cell).sum::<i64>() % 2 == 0;
+    let [bright, dim] = [[200, 60, 40], [40, 60, 200]];
+    match (dark, part) {
+        (true, _) => [60, 60, 60],
+        (false, 0) => bright,
+        (false, _) => dim,
+    }
+}
+
+/// Of each coordinate: the square it lies in, and how far from its border. Shifted, so that no face
+/// lies on a border.
+fn edge(x: DVec3) -> [(i64, f64); 3] {
+    x.to_array().map(|x| {
+        let cells = x / 0.04 + 100.3;
+        (cells.floor() as i64, 0.04 * (0.5 - (cells.fract() - 0.5).abs()))
+    })
+}
+
+fn config(max_texels: usize) -> Config {
+    Config { voxel: 1.0 / 64.0, max_texels, ..Default::default() }
+}
+
+fn seen(state: usize, view: usize) -> Observation {
+    observe(&slabs(), &squares, state, view)
+}
+
+/// Points within faces and the colour of the picture there.
+fn texels(mesh: &TriMesh, texture: &Texture) -> Vec<(Vec3, [u8; 3])> {
+    let shares = [[0.6, 0.2, 0.2], [0.2, 0.6, 0.2], [0.2, 0.2, 0.6], [0.34, 0.33, 0.33]];
+    let mut out = Vec::new();
+    for face in &texture.faces {
+        for share in shares {
+            let mix =
+                |of: &dyn Fn(usize) -> Vec3| -> Vec3 { face.iter().zip(share).map(|(&k, s)| s * of(k as usize)).sum() };
+            let at = mix(&|k| mesh.vertices[texture.vertices[k] as usize]);
+            let uv = mix(&|k| Vec2::from(texture.corners[k]).extend(0.0));
+            let x = ((uv.x * texture.width as f32) as usize).min(texture.width - 1);
+            let y = (((1.0 - uv.y) * texture.height as f32) as usize).min(texture.height - 1);
+            let place = 3 * (y * texture.width + x);
+            out.push((at, [0, 1, 2].map(|k| texture.rgb[place + k])));
+        }
+    }
+    out
+}
+
+/// Share of the points well within squares, on the outer faces, whose colour is the square's to
+/// within `levels`.
+fn right(twin: &Twin, part: usize, levels: u8) -> f64 {
+    let model = &twin.parts[part];
+    let [lo, hi] = [DVec3::new(-0.2, -0.15, 0.0), DVec3::new(0.2, 0.15, if part == 0 { 0.2 } else { 0.22 })];
+    let (mut n, mut hits) = (0, 0);
+    for (at, color) in texels(&model.mesh, model.texture.as_ref().expect("a picture")) {
+        let at = at.as_dvec3();
+        // Of an outer face that cameras see: not below, not where base and lid touch.
+        let side = [lo.x, hi.x].iter().any(|x| (at.x - x).abs() < 0.001)
+            || [lo.y, hi.y].iter().any(|y| (at.y - y).abs() < 0.001);
+        let inner = if part == 0 { (0.03..0.17).contains(&at.z) && side } else { (at.z - hi.z).abs() < 0.001 };
+        // Well within: the coordinates along the face (the one across it is near a border or not,
+        // the same everywhere).
+        let across = (0..3).min_by(|&a, &b| {
+            let off = |k: usize| (at[k] - lo[k]).abs().min((at[k] - hi[k]).abs());
+            off(a).total_cmp(&off(b))
+        });
+        let deep = edge(at).iter().enumerate().all(|(k, (_, border))| Some(k) == across || *border > 0.01);
+        if inner && deep {
+            let is = squares(part, at);
+            n += 1;
+            hits += usize::from(color.iter().zip(is).all(|(a, b)| a.abs_diff(b) <= levels));
+        }
+    }
+    assert!(n > 100, "{n} points of part {part} asked");
+    hits as f64 / n as f64
+}
+
+#[test]
+fn the_picture_shows_what_the_photographs_show() {
+    let twin = twin_of(&seen, &config(1 << 20));
+    for part in 0..2 {
+        let share = right(&twin, part, 24);
+        assert!(share > 0.97, "part {part}: {share} of the points have their colour");
+        let texture = twin.parts[part].texture.as_ref().unwrap();
+        assert_eq!(texture.faces.len(), twin.parts[part].mesh.faces.len());
+        assert_eq!(texture.rgb.len(), 3 * texture.width * texture.height);
+    }
+    are_read_by_others(&twin);
+}
+
+/// The files of `twin`: OBJ, MTL and PNG.
+fn are_read_by_others(twin: &Twin) {
+    let dir = tempfile::tempdir().unwrap();
+    let folder = dir.path().join("twin");
+    write(twin, None, &folder).unwrap();
+    let visual = folder.join("meshes/visual");
+    for part in 0..2 {
+        let texture = twin.parts[part].texture.as_ref().unwrap();
+        let [obj, mtl] =
+            ["obj", "mtl"].map(|end| std::fs::read_to_string(visual.join(format!("part_{part}.{end}"))).unwrap());
+        let count = |of: &str| obj.lines().filter(|l| l.starts_with(of)).count();
+        let mesh = &twin.parts[part].mesh;
+        assert_eq!(
+            [count("v "), count("vt "), count("f ")],
+            [mesh.vertices.len(), texture.corners.len(), mesh.faces.len()]
+        );
+        assert!(obj.contains(&format!("mtllib part_{part}.mtl")) && mtl.contains(&format!("map_Kd part_{part}.png")));
+        let file = std::io::BufReader::new(std::fs::File::open(visual.join(format!("part_{part}.png"))).unwrap());
+        let mut reader = png::Decoder::new(file).read_info().unwrap();
+        let mut rgb = vec![0; reader.output_buffer_size().unwrap()];
+        reader.next_frame(&mut rgb).unwrap();
+        assert_eq!(rgb, texture.rgb);
+    }
+    // A material of the URDF would lie over that of the OBJ.
+    assert!(!std::fs::read_to_string(folder.join("robot.urdf")).unwrap().contains("<material"));
+    // A twin that is written again may replace all of it, and nothing that somebody else put there.
+    assert!(is_ours(std::path::Path::new("meshes/visual/part_0.png")));
+    assert!(is_ours(std::path::Path::new("meshes/visual/part_1.mtl")));
+    assert!(!is_ours(std::path::Path::new("meshes/visual/photo.png")));
+}
+
+/// Every other picture is half as bright: without a word about it, squares would be a mixture.
+#[test]
+fn exposures_are_made_even() {
+    let uneven = |state: usize, view: usize| {
+        let mut seen = seen(state, view);
+        if view % 2 == 1 {
+            seen.rgb.iter_mut().for_each(|c| *c = (*c as f32 * 0.6) as u8);
+        }
+        seen
+    };
+    let twin = twin_of(&uneven, &config(1 << 20));
+    for part in 0..2 {
+        let texture = twin.parts[part].texture.as_ref().unwrap();
+        // The strongest channel of the bright squares, wherever they are: one value.
+        let strong = if part == 0 { 0 } else { 2 };
+        let mut bright: Vec<u8> = texels(&twin.parts[part].mesh, texture)
+            .iter()
+            .filter(|(at, _)| {
+                let at = at.as_dvec3();
+                squares(part, at)[strong] == 200 && edge(at).iter().all(|(_, border)| *border > 0.008)
+            })
+            .map(|(_, color)| color[strong])
+            .collect();
+        bright.sort_unstable();
+        let at = |share: f64| bright[(share * (bright.len() - 1) as f64) as usize];
+        assert!(at(0.8) - at(0.2) < 25, "part {part}: {} to {} of {}", at(0.2), at(0.8), bright.len());
+    }
+}
+
+/// Asked for few texels, the picture is coarse; on however many threads, the same.
+#[test]
+fn few_texels_on_one_thread_and_many() {
+    let on = |threads: usize| {
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+        pool.install(|| twin_of(&seen, &config(20_000))).parts.into_iter().map(|p| p.texture).collect::<Vec<_>>()
+    };
+    let one = on(1);
+    for texture in &one {
+        let texels = texture.as_ref().map(|t| t.width * t.height);
+        assert!(texels.is_some_and(|n| (2_000..30_000).contains(&n)), "{texels:?}");
+    }
+    assert_eq!(one, on(3));
+}
