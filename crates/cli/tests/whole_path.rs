@@ -5,6 +5,9 @@ mod common;
 use common::{TINY, assert_finite, assert_same_bytes, files, hingecast, tiny_recording};
 use std::path::Path;
 
+/// The twin of the whole path has textures, at a bound; other tiny builds do without.
+const PHOTOGRAPHS: &str = "--set twin.max_texels=300000";
+
 const SCREW: [&str; 4] = ["parts", "splat", "joints", "twin"];
 const TRACK: [&str; 5] = ["splat", "motion", "parts", "joints", "twin"];
 
@@ -63,7 +66,7 @@ fn synth_check_build_eval_report() {
     assert_eq!(errors, 0, "{checked}");
     assert_eq!(json["states"].as_array().unwrap().len(), 5 + 2, "five states and two held-out ones: {checked}");
 
-    let built = hingecast(dir, &format!("build rec -o run --json {TINY}")).done();
+    let built = hingecast(dir, &format!("build rec -o run --json {TINY} {PHOTOGRAPHS}")).done();
     let answer = built.json();
     assert!(answer["secs"].as_f64().unwrap() > 0.0 && answer["peak_memory"].as_f64().unwrap() > 1e6, "{built}");
     let twin = dir.join("run/twin");
@@ -77,6 +80,11 @@ fn synth_check_build_eval_report() {
         assert!(check.finite, "{check:?}");
         assert!(check.geoms > 0, "{check:?}");
         assert_eq!(check.warnings, Vec::<String>::new(), "{}", check.file);
+    }
+    // The photographs are on it.
+    for part in 0..2 {
+        let [obj, picture] = ["obj", "png"].map(|end| twin.join(format!("meshes/visual/part_{part}.{end}")));
+        assert!(text(&obj).contains("vt ") && picture.is_file(), "{}", picture.display());
     }
     // Every mesh file that the robots name is there; urdf and mjcf name the same joints.
     let (urdf, mjcf) = (text(&twin.join("robot.urdf")), text(&twin.join("robot.xml")));
@@ -116,7 +124,7 @@ fn synth_check_build_eval_report() {
     }
 
     // The same command again changes nothing and is quick about it.
-    let again = hingecast(dir, &format!("build rec -o run {TINY}")).done();
+    let again = hingecast(dir, &format!("build rec -o run {TINY} {PHOTOGRAPHS}")).done();
     assert_eq!(again.stderr.matches("kept").count(), 4, "{again}");
 }
 

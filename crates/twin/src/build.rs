@@ -3,8 +3,8 @@
 use crate::field::Field;
 use crate::vertices::Points;
 use crate::{
-    Inertial, Observation, PartModel, Twin, clearance, color, fuse, hulls, mass, separate, simplify, snap, solid,
-    surface, texture, vertices,
+    Inertial, Observation, PartModel, Twin, clearance, color, exposure, fuse, hulls, mass, separate, simplify, snap,
+    solid, surface, texture, vertices,
 };
 use glam::{DMat3, DVec3};
 use hingecast_geom::{Cancelled, KinematicTree, Pose, Progress, TriMesh};
@@ -65,7 +65,7 @@ pub struct Input<'a> {
     pub tree: &'a KinematicTree,
     /// States of the recording: a tree without joints does not tell.
     pub n_states: usize,
-    /// Number of observations; `load(i)` is called up to six times for each.
+    /// Number of observations; `load(i)` is called up to seven times for each.
     pub n_observations: usize,
     /// Diagonal of the object's box in the first state, scene units.
     pub diagonal: f64,
@@ -135,12 +135,14 @@ pub fn build<E: From<Cancelled> + Send>(
     drop(fields);
     let points: Vec<Points> = meshes.iter().map(Points::of).collect();
     let tolerance = 2.0 * voxel;
+    let gains = exposure::gains(&meshes, &poses, config.color_views, tolerance, &shown)?;
+    let evened = exposure::evened(&gains, &shown);
     let sums =
-        vertices::collect(&points.iter().collect::<Vec<_>>(), &poses, config.color_views, &shown, &|sum, glimpse| {
+        vertices::collect(&points.iter().collect::<Vec<_>>(), &poses, config.color_views, &evened, &|sum, glimpse| {
             color::accumulate(sum, glimpse, tolerance);
         })?;
     meshes.iter_mut().zip(&sums).for_each(|(mesh, sums)| color::finish(mesh, sums));
-    let textures = texture::paint(&meshes, &sums, &poses, config, tolerance, &shown, progress)?;
+    let textures = texture::paint(&meshes, &sums, &poses, config, tolerance, &evened, progress)?;
 
     let hull_config = hulls::HullConfig { max_hulls: config.max_hulls, ..Default::default() };
     let decomposed: Vec<(Vec<TriMesh>, usize)> =

@@ -63,6 +63,7 @@ pub mod build;
 pub mod clearance;
 mod color;
 pub mod export;
+mod exposure;
 mod field;
 pub mod fuse;
 pub mod hulls;

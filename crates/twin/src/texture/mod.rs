@@ -3,11 +3,10 @@
 //!
 //! ```text
 //! mesh --atlas--> charts, texels in space --paint--> colour of each texel --fill--> picture
-//! views --exposure--> views that agree on colours --------^
+//! views that agree on colours ----------------------------^
 //! ```
 
 mod atlas;
-mod exposure;
 pub mod files;
 mod paint;
 
@@ -36,7 +35,7 @@ pub struct Texture {
 }
 
 /// A picture for each part that has a surface; `sums` are what its coloured vertices collected.
-/// Parts whose surface cannot be cut into charts have none. [part]
+/// Parts whose surface cannot be cut into charts have none. `shown`: views made equally bright. [part]
 ///
 /// # Errors
 /// What `shown` answers, or [`Cancelled`].
@@ -60,9 +59,7 @@ pub fn paint<E: From<Cancelled>>(
     progress.check()?;
     let none = Points::default();
     let texels: Vec<&Points> = atlases.iter().map(|a| a.as_ref().map_or(&none, |a| &a.texels)).collect();
-    let gains = exposure::gains(meshes, poses, config.color_views, tolerance, shown)?;
-    let evened = exposure::evened(&gains, shown);
-    let painted = vertices::collect(&texels, poses, config.color_views, &evened, &|sum, glimpse| {
+    let painted = vertices::collect(&texels, poses, config.color_views, shown, &|sum, glimpse| {
         paint::accumulate(sum, glimpse, tolerance);
     })?;
     let finish = |(atlas, sums): (Option<atlas::Atlas>, Vec<[f32; 4]>)| atlas.map(|a| paint::finish(a, &sums));
