@@ -26,11 +26,11 @@ const COVERS: f32 = 0.5;
 const EVERY: usize = 13;
 const NEAR: f32 = 2.5;
 const FEW: usize = 50;
-/// No plane's own samples are taken to be farther off than this, voxels. One whose are, and which fills less
-/// than this share of its extent, in patches of so many voxels, is the fronts of several things, by chance in
-/// line.
+/// No plane's own samples are taken to be farther off than this, voxels. One whose are must fill the first
+/// share of its extent, in patches of so many voxels, and any other the second (but not the floor, which may
+/// be seen in patches only): else it is the fronts of several things, or their tops, by chance in line.
 const BLURRED: f32 = 1.5;
-const FILLED: f32 = 0.7;
+const FILLED: [f32; 2] = [0.7, 0.4];
 const PATCH: f32 = 3.0;
 
 /// A thing lies on a plane if its top is at least so many tolerances of it before it, and not more than so
@@ -217,7 +217,9 @@ fn is_support(plane: &Plane, points: &[Vec3], moved: &[Vec3], all: &[Vec3], up: 
     let sides = [a, plane.normal.cross(a)];
     let size = |points: &[Vec3]| sides.map(|s| spread(points, s));
     let (own, seed, seen) = (size(points), size(moved), size(all));
-    if plane.tolerance >= BLURRED * voxel && filled(points, sides, voxel) < FILLED * own[0] * own[1] {
+    let share = filled(points, sides, voxel) / (own[0] * own[1]);
+    let blurred = plane.tolerance >= BLURRED * voxel;
+    if blurred && share < FILLED[0] {
         return false;
     }
     let larger = own[0] * own[1] > LARGER * seed[0] * seed[1];
@@ -226,7 +228,7 @@ fn is_support(plane: &Plane, points: &[Vec3], moved: &[Vec3], all: &[Vec3], up: 
         let below = all.iter().filter(|x| plane.height(**x) < -DEEP * voxel).count();
         (below as f64) < BEHIND * all.len() as f64
     };
-    larger && (lowest || (0..2).all(|k| own[k] > COVERS * seen[k]))
+    larger && (lowest || share > FILLED[1] && (0..2).all(|k| own[k] > COVERS * seen[k]))
 }
 
 /// Area in which there are points, along two directions.
@@ -267,5 +269,25 @@ mod tests {
         assert!(!plane(0.7, 0.02).lies_on(&plane(0.0, 0.0075), &at(0.7), 0.025));
         let wall = Plane { normal: Vec3::Y, ..plane(0.04, 0.02) };
         assert!(!wall.lies_on(&plane(0.0, 0.0075), &at(0.04), 0.025));
+    }
+
+    /// A chest among things as high as its rim was cut off at the rim, by a table that was none.
+    #[test]
+    fn tops_of_things_in_line_are_no_table() {
+        let grid = |lo: [f32; 2], hi: [f32; 2], z: f32| -> Vec<Vec3> {
+            let steps = |k: usize| ((hi[k] - lo[k]) / 0.025) as usize;
+            let row = |i: usize| (0..steps(1)).map(move |j| (i, j));
+            let at = |(i, j): (usize, usize)| Vec3::new(lo[0] + 0.025 * i as f32, lo[1] + 0.025 * j as f32, z);
+            (0..steps(0)).flat_map(row).map(at).collect()
+        };
+        let (voxel, level) = (0.025, plane(0.5, 0.0125));
+        let lid = grid([-0.4, -0.4], [0.4, 0.4], 0.7);
+        let corners = [[-2.0, -1.2], [1.5, -1.2], [-2.0, 0.7], [1.5, 0.7], [-0.4, -0.3]];
+        let tops: Vec<Vec3> = corners.iter().flat_map(|c| grid(*c, [c[0] + 0.5, c[1] + 0.5], 0.5)).collect();
+        let table = grid([-2.0, -1.2], [2.0, 1.2], 0.5);
+        for (points, is) in [(tops, false), (table, true)] {
+            let all = [grid([-2.2, -1.3], [2.2, 1.3], 0.0), points.clone(), lid.clone()].concat();
+            assert_eq!(is_support(&level, &points, &lid, &all, Vec3::Z, voxel), is);
+        }
     }
 }

@@ -10,8 +10,8 @@ use hingecast_geom::Pose;
 use hingecast_geom::icp::Surface;
 
 /// What is pushed stays on its floor: largest tilt, radians, and rise, shares of the longest side.
-const TILT: f64 = 0.03;
-const RISE: f64 = 0.02;
+const TILT: f64 = 0.015;
+const RISE: f64 = 0.01;
 /// A push is believed when it explains so many times what the place nearest to the recorded one
 /// does.
 const EARNED: f64 = 1.25;
@@ -26,8 +26,13 @@ const EARNED_FINELY: f64 = 1.15;
 /// stayed.
 const CLEARLY: f64 = 2.5;
 const STANDS: f64 = 0.05;
-/// Of two places, the one that turns less is believed if it explains this share of what the other does.
-const NEARLY: f64 = 0.8;
+/// With less than this share, a push needs no more than the nearest place: a box that slid along its
+/// own long sides is found again on most of itself.
+const HARDLY_STANDS: f64 = 0.01;
+/// A place that turns further than another, by this many radians, must explain so many times what that
+/// does: doors open far, and people push things by a few degrees.
+const FURTHER: f64 = 0.09;
+const EARNED_FURTHER: f64 = 1.5;
 /// Rounds in which a place is settled finely, and samples of that.
 const ROUNDS: usize = 24;
 const SAMPLES: usize = 4000;
@@ -148,19 +153,14 @@ impl<'a> Place<'a> {
         // A door that opened by little takes more surface with it than is seen of a fridge: of what is nearly
         // as good, that which turns least is believed.
         let turn = |pose: &Pose| (*pose * home.inverse()).angle();
-        let nearly = || places.iter().filter(|(on, _)| count(on) as f64 >= NEARLY * most);
+        let nearly = || places.iter().filter(|(on, _)| EARNED_FURTHER * count(on) as f64 >= most);
         let least = nearly().map(|(_, pose)| turn(pose)).fold(f64::INFINITY, f64::min);
-        let best = nearly().filter(|(_, pose)| turn(pose) < least + STRAIGHT).max_by_key(|(on, _)| count(on)).cloned();
+        let best = nearly().filter(|(_, pose)| turn(pose) < least + FURTHER).max_by_key(|(on, _)| count(on)).cloned();
         let Some((best_on, best)) = best.filter(|(on, _)| count(on) >= FEW) else { return home };
         // What stands still has drifted a little at most: a push must beat the place that is found from
         // home, too.
         let near = tried[0];
         let found_near = farthest(&best, &near, &self.even.points) < far;
-        let enough = match found_near {
-            true => EARNED_FINELY,
-            false if (best * home.inverse()).angle() < STRAIGHT => EARNED_STRAIGHT,
-            false => EARNED,
-        };
         let (mut stood, mut stood_on) = (home, self.on(&home, within));
         if !found_near {
             let near_on = self.on(&near, within);
@@ -177,7 +177,14 @@ impl<'a> Place<'a> {
         });
         let (all, stands) = carried_off
             .fold((0usize, 0usize), |(all, stands), i| (all + 1, stands + usize::from(stood_on[i] && !best_on[i])));
-        let believed = earned > enough && all >= FEW / 2 && (stands as f64) < STANDS * all as f64;
+        let stands = stands as f64 / all.max(1) as f64;
+        let enough = match found_near {
+            true => EARNED_FINELY,
+            false if (best * home.inverse()).angle() < STRAIGHT => EARNED_STRAIGHT,
+            false if stands < HARDLY_STANDS => EARNED_FINELY,
+            false => EARNED,
+        };
+        let believed = earned > enough && all >= FEW / 2 && stands < STANDS;
         if believed { best } else { home }
     }
 }

@@ -27,7 +27,7 @@ const TURN: f64 = 0.25;
 const SHIFT: f64 = 0.2;
 /// What is pushed stays upright and on its floor within so many times what is allowed, before its place is
 /// settled finely.
-const LOOSELY: f64 = 2.0;
+const LOOSELY: f64 = 4.0;
 /// Places that are settled finely.
 const FINALISTS: usize = 6;
 /// Places per compared state that are tried.
