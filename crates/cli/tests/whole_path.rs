@@ -5,8 +5,8 @@ mod common;
 use common::{TINY, assert_finite, assert_same_bytes, files, hingecast, tiny_recording};
 use std::path::Path;
 
-/// The twin of the whole path has textures, at a bound; other tiny builds do without.
-const PHOTOGRAPHS: &str = "--set twin.max_texels=300000";
+/// The whole path has pictures that are compared, and textures, at a bound; other tiny builds do with less.
+const PHOTOGRAPHS: &str = "--set fit.steps=120 --set fit.gaussians=2000 --set twin.max_texels=300000";
 
 const SCREW: [&str; 4] = ["parts", "splat", "joints", "twin"];
 const TRACK: [&str; 5] = ["splat", "motion", "parts", "joints", "twin"];

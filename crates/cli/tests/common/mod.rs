@@ -92,7 +92,7 @@ pub fn tiny_recording(dir: &Path) -> PathBuf {
 }
 
 /// Settings for a build in seconds: it shows the path, not the quality.
-pub const TINY: &str = "--set fit.steps=120 --set fit.gaussians=2000 --set track.steps=30 --set parts.sample=400 \
+pub const TINY: &str = "--set fit.steps=40 --set fit.gaussians=1000 --set track.steps=30 --set parts.sample=400 \
                         --set twin.voxel=0.012 --set twin.max_hulls=8 --set twin.max_texels=0";
 
 /// Flags of `synth`: a small picture of an object in a room, as people scan it.
