@@ -136,13 +136,20 @@ pub fn build<E: From<Cancelled> + Send>(
     let points: Vec<Points> = meshes.iter().map(Points::of).collect();
     let tolerance = 2.0 * voxel;
     let gains = exposure::gains(&meshes, &poses, config.color_views, tolerance, &shown)?;
-    let evened = exposure::evened(&gains, &shown);
+    let evened = |most: usize, visit: &mut dyn FnMut(&[Observation])| -> Result<(), E> {
+        let mut next = 0;
+        shown(most, &mut |batch| {
+            visit(&exposure::evened(batch, &gains[next..]));
+            next += batch.len();
+        })
+    };
     let sums =
         vertices::collect(&points.iter().collect::<Vec<_>>(), &poses, config.color_views, &evened, &|sum, glimpse| {
             color::accumulate(sum, glimpse, tolerance);
         })?;
     meshes.iter_mut().zip(&sums).for_each(|(mesh, sums)| color::finish(mesh, sums));
-    let textures = texture::paint(&meshes, &sums, &poses, config, tolerance, &evened, progress)?;
+    let most = texture::Most { texels: config.max_texels, views: config.color_views };
+    let textures = texture::paint(&meshes, &sums, &poses, &most, tolerance, &evened, progress)?;
 
     let hull_config = hulls::HullConfig { max_hulls: config.max_hulls, ..Default::default() };
     let decomposed: Vec<(Vec<TriMesh>, usize)> =

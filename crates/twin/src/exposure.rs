@@ -95,22 +95,13 @@ fn solve(views: &[&[(u32, f32)]], asked: usize) -> Vec<f32> {
     gains.into_iter().map(|gain| gain.exp().clamp(1.0 / MOST, MOST)).collect()
 }
 
-/// `shown` with its views' colours multiplied by `gains`; to be asked for as many views as these are.
-pub fn evened<'a, E>(
-    gains: &'a [[f32; 3]],
-    shown: &'a Shown<E>,
-) -> impl Fn(usize, &mut dyn FnMut(&[Observation])) -> Result<(), E> + 'a {
-    move |views, visit| {
-        let mut next = 0;
-        shown(views, &mut |batch| {
-            let mut batch = batch.to_vec();
-            batch.par_iter_mut().zip(&gains[next..]).for_each(|(seen, gain)| {
-                for (i, value) in seen.rgb.iter_mut().enumerate() {
-                    *value = (*value as f32 * gain[i % 3]).round().min(255.0) as u8;
-                }
-            });
-            next += batch.len();
-            visit(&batch);
-        })
-    }
+/// Views with their colours multiplied by `gains`, one of these a view.
+pub fn evened(views: &[Observation], gains: &[[f32; 3]]) -> Vec<Observation> {
+    let mut views = views.to_vec();
+    views.par_iter_mut().zip(gains).for_each(|(seen, gain)| {
+        for (i, value) in seen.rgb.iter_mut().enumerate() {
+            *value = (*value as f32 * gain[i % 3]).round().min(255.0) as u8;
+        }
+    });
+    views
 }

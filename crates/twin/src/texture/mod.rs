@@ -10,7 +10,6 @@ mod atlas;
 pub mod files;
 mod paint;
 
-use crate::Config;
 use crate::color::Sum;
 use crate::vertices::{self, Points, Shown};
 use hingecast_geom::{Cancelled, Pose, Progress, TriMesh};
@@ -34,6 +33,14 @@ pub struct Texture {
     pub rgb: Vec<u8>,
 }
 
+/// How much a picture may cost.
+pub struct Most {
+    /// Texels of one part's picture; 0: no pictures.
+    pub texels: usize,
+    /// Views that are asked.
+    pub views: usize,
+}
+
 /// A picture for each part that has a surface; `sums` are what its coloured vertices collected.
 /// Parts whose surface cannot be cut into charts have none. `shown`: views made equally bright. [part]
 ///
@@ -43,23 +50,23 @@ pub fn paint<E: From<Cancelled>>(
     meshes: &[TriMesh],
     sums: &[Vec<Sum>],
     poses: &[Vec<Pose>],
-    config: &Config,
+    most: &Most,
     tolerance: f32,
     shown: &Shown<E>,
     progress: &Progress,
 ) -> Result<Vec<Option<Texture>>, E> {
-    if config.max_texels == 0 {
+    if most.texels == 0 {
         return Ok(vec![None; meshes.len()]);
     }
     let cut = |(mesh, sums): (&TriMesh, &Vec<Sum>)| {
         let finest = finest(sums)?;
-        atlas::cut(mesh, finest, config.max_texels, progress)
+        atlas::cut(mesh, finest, most.texels, progress)
     };
     let atlases: Vec<Option<atlas::Atlas>> = meshes.par_iter().zip(sums).map(cut).collect();
     progress.check()?;
     let none = Points::default();
     let texels: Vec<&Points> = atlases.iter().map(|a| a.as_ref().map_or(&none, |a| &a.texels)).collect();
-    let painted = vertices::collect(&texels, poses, config.color_views, shown, &|sum, glimpse| {
+    let painted = vertices::collect(&texels, poses, most.views, shown, &|sum, glimpse| {
         paint::accumulate(sum, glimpse, tolerance);
     })?;
     let finish = |(atlas, sums): (Option<atlas::Atlas>, Vec<[f32; 4]>)| atlas.map(|a| paint::finish(a, &sums));
