@@ -3,7 +3,7 @@
 //! ```text
 //! observations --fuse--> signed distance per part --surface--> mesh --simplify, colour--> visual mesh
 //!                                                               |--hulls--> collision   |--mass--> inertia
-//! everything --urdf, mjcf, twin.json--> a folder
+//! everything --urdf, mjcf, glb, twin.json--> a folder
 //! ```
 //! Every part is fused in its own frame from all states: the inside of a drawer and the back of a
 //! door are there.
@@ -66,6 +66,7 @@ pub mod export;
 mod exposure;
 mod field;
 pub mod fuse;
+pub mod glb;
 pub mod hulls;
 pub mod link;
 pub mod mass;

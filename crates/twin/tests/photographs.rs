@@ -120,6 +120,7 @@ fn are_read_by_others(twin: &Twin) {
         reader.next_frame(&mut rgb).unwrap();
         assert_eq!(rgb, texture.rgb);
     }
+    is_read_as_gltf(twin, &folder.join("robot.glb"));
     // A material of the URDF would lie over that of the OBJ.
     assert!(!std::fs::read_to_string(folder.join("robot.urdf")).unwrap().contains("<material"));
     // A twin that is written again may replace all of it, and nothing that somebody else put there.
@@ -170,4 +171,54 @@ fn few_texels_on_one_thread_and_many() {
         assert!(texels.is_some_and(|n| (2_000..30_000).contains(&n)), "{texels:?}");
     }
     assert_eq!(one, on(3));
+}
+
+/// Somebody else's reader finds the surface, its picture, and the lid where its joint puts it.
+fn is_read_as_gltf(twin: &Twin, path: &std::path::Path) {
+    let (file, buffers, images) = gltf::import(path).unwrap();
+    let raw = std::fs::read(path).unwrap();
+    let json: serde_json::Value = serde_json::from_slice(&gltf::Glb::from_slice(&raw).unwrap().json).unwrap();
+    let names = |of: &str| json[of].as_array().unwrap().iter().map(|x| x["name"].clone()).collect::<Vec<_>>();
+    assert_eq!(
+        (names("nodes"), names("animations")),
+        (vec!["base".into(), "lid".into(), "box".into()], vec!["hinge".into()])
+    );
+    let node = |part: usize| file.nodes().nth(part).unwrap();
+    let bytes = |b: gltf::Buffer| buffers.get(b.index()).map(|b| &b.0[..]);
+    for (part, image) in images.iter().enumerate() {
+        let texture = twin.parts[part].texture.as_ref().unwrap();
+        assert_eq!((&image.pixels, image.width as usize), (&texture.rgb, texture.width));
+    }
+    let first = |part: usize| -> Vec3 {
+        let primitive = node(part).mesh().unwrap().primitives().next().unwrap();
+        Vec3::from(primitive.reader(bytes).read_positions().unwrap().next().unwrap())
+    };
+    let of_mesh = |part: usize| {
+        let corner = twin.parts[part].texture.as_ref().unwrap().vertices[0];
+        twin.parts[part].mesh.vertices[corner as usize]
+    };
+    assert!((first(0) - of_mesh(0)).length() < 1e-6);
+    let (rest, _, _) = node(1).transform().decomposed();
+    let link = Vec3::from(rest);
+    assert!((link + first(1) - of_mesh(1)).length() < 1e-6);
+
+    let animation = file.animations().next().unwrap();
+    let channel = animation.channels().next().unwrap();
+    assert_eq!(channel.target().node().index(), 1);
+    let reader = channel.reader(bytes);
+    let gltf::animation::util::ReadOutputs::Rotations(turns) = reader.read_outputs().unwrap() else {
+        panic!("a hinge turns");
+    };
+    let turns: Vec<glam::Quat> = turns.into_f32().map(glam::Quat::from_array).collect();
+    assert_eq!((turns.len(), reader.read_inputs().unwrap().count()), (49, 49));
+    // Half of the time there, half of it back: 1.5 rad in the middle.
+    for (k, q) in [(0, 0.0), (12, 0.75), (24, 1.5), (36, 0.75), (48, 0.0)] {
+        let at = link + turns[k] * first(1);
+        let should = twin.tree.joints[0].screw.motion(q).apply(of_mesh(1).as_dvec3()).as_vec3();
+        assert!((at - should).length() < 1e-5, "at {q}: {at} {should}");
+    }
+    // z was up, and y is.
+    let root = file.default_scene().unwrap().nodes().next().unwrap();
+    let (_, upright, _) = root.transform().decomposed();
+    assert!((glam::Quat::from_array(upright) * Vec3::Z - Vec3::Y).length() < 1e-6);
 }
