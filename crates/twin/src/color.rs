@@ -64,3 +64,9 @@ pub fn finish(mesh: &mut TriMesh, sums: &[Sum]) {
     }
     mesh.colors = colors.iter().map(|c| c.unwrap_or([128.0; 3]).map(|x| x.round() as u8)).collect();
 }
+
+/// Linear value of an sRGB one (IEC 61966-2-1): vertex colours of glTF and USD are linear.
+pub fn linear(srgb: u8) -> f32 {
+    let s = f32::from(srgb) / 255.0;
+    if s <= 0.04045 { s / 12.92 } else { ((s + 0.055) / 1.055).powf(2.4) }
+}

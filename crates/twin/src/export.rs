@@ -1,4 +1,4 @@
-//! The twin folder: `twin.json`, `robot.urdf`, `robot.xml`, `robot.glb`, `meshes/{visual,collision}`,
+//! The twin folder: `twin.json`, `robot.{urdf,xml,glb,usda}`, `meshes/{visual,collision}`,
 //! `splats/<part>.ply`.
 //!
 //! Link frames: axes of the canonical world; origin on the joint axis nearest the part's centre of
@@ -6,7 +6,7 @@
 //! in link frames.
 
 use crate::link::{hull_file, link_origin, mean_color, texture_file, visual_file};
-use crate::{PartModel, Twin, glb, mjcf, texture, urdf};
+use crate::{PartModel, Twin, glb, mjcf, texture, urdf, usd};
 use glam::{DVec3, Vec3};
 use hingecast_geom::ply::PlyError;
 use hingecast_geom::staging::{Staging, write_whole};
@@ -67,6 +67,7 @@ pub fn write(twin: &Twin, splats: Option<(&Gaussians, &[u8])>, dir: &Path) -> Re
         write_whole(&path, &content).map_err(at(&path))
     };
     file("robot.urdf", urdf::to_string(twin).into_bytes())?;
+    file("robot.usda", usd::to_string(twin).into_bytes())?;
     file("robot.xml", mjcf::to_string(twin).into_bytes())?;
     file("robot.glb", glb::to_bytes(twin).map_err(at(&staging.join("robot.glb")))?)?;
     let summary = serde_json::to_string_pretty(&summary(twin)).expect("plain data") + "\n";
@@ -82,7 +83,7 @@ pub fn is_ours(path: &Path) -> bool {
             .any(|end| name.strip_prefix("part_").and_then(|n| n.strip_suffix(end)).is_some_and(|n| !n.is_empty()))
     };
     match names.as_deref() {
-        Some(["twin.json" | "robot.urdf" | "robot.xml" | "robot.glb"]) => true,
+        Some(["twin.json" | "robot.glb" | "robot.urdf" | "robot.usda" | "robot.xml"]) => true,
         Some(["meshes", "visual", name]) => part(name, &[".obj", ".mtl", ".png", ".ply"]),
         Some(["meshes", "collision", name]) => part(name, &[".obj"]),
         Some(["splats", name]) => part(name, &[".ply"]),

@@ -4,6 +4,7 @@
 //! glTF is y-up, in metres; the root node turns the twin's up to y. Link frames are those of
 //! [`crate::export`]: a joint turns its node about the node's origin, or slides it.
 
+use crate::color::linear;
 use crate::link::link_origin;
 use crate::{PartModel, Twin};
 use glam::{DQuat, DVec3, Vec3};
@@ -229,10 +230,4 @@ fn container(text: &[u8], bytes: &[u8]) -> Vec<u8> {
         }
     }
     out
-}
-
-/// Linear value of an sRGB one (IEC 61966-2-1): vertex colours of glTF are linear.
-fn linear(srgb: u8) -> f32 {
-    let s = f32::from(srgb) / 255.0;
-    if s <= 0.04045 { s / 12.92 } else { ((s + 0.055) / 1.055).powf(2.4) }
 }

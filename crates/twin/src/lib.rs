@@ -3,7 +3,7 @@
 //! ```text
 //! observations --fuse--> signed distance per part --surface--> mesh --simplify, colour--> visual mesh
 //!                                                               |--hulls--> collision   |--mass--> inertia
-//! everything --urdf, mjcf, glb, twin.json--> a folder
+//! everything --urdf, mjcf, glb, usd, twin.json--> a folder
 //! ```
 //! Every part is fused in its own frame from all states: the inside of a drawer and the back of a
 //! door are there.
@@ -81,6 +81,7 @@ pub mod surface;
 mod texture;
 mod thin;
 pub mod urdf;
+pub mod usd;
 mod vertices;
 mod xml;
 

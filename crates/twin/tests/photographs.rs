@@ -121,6 +121,7 @@ fn are_read_by_others(twin: &Twin) {
         assert_eq!(rgb, texture.rgb);
     }
     is_read_as_gltf(twin, &folder.join("robot.glb"));
+    says_what_usd_asks(twin, &std::fs::read_to_string(folder.join("robot.usda")).unwrap());
     // A material of the URDF would lie over that of the OBJ.
     assert!(!std::fs::read_to_string(folder.join("robot.urdf")).unwrap().contains("<material"));
     // A twin that is written again may replace all of it, and nothing that somebody else put there.
@@ -221,4 +222,35 @@ fn is_read_as_gltf(twin: &Twin, path: &std::path::Path) {
     let root = file.default_scene().unwrap().nodes().next().unwrap();
     let (_, upright, _) = root.transform().decomposed();
     assert!((glam::Quat::from_array(upright) * Vec3::Z - Vec3::Y).length() < 1e-6);
+}
+
+/// No Rust crate reads UsdPhysics; `scripts/consumers.py` lets OpenUSD's own validators read such files.
+fn says_what_usd_asks(twin: &Twin, text: &str) {
+    let after = |from: &str, key: &str| -> Vec<f64> {
+        let rest = text.split(from).nth(1).and_then(|rest| rest.split(key).nth(1)).unwrap();
+        let row = rest.lines().next().unwrap().trim_matches(|c| "= ()".contains(c));
+        row.split(", ").map(|x| x.parse().unwrap()).collect()
+    };
+    let hinge = "def PhysicsRevoluteJoint \"hinge\"";
+    let joint = &twin.tree.joints[0];
+    let turned = after(hinge, "quatf physics:localRot0");
+    let turned = glam::DQuat::from_xyzw(turned[1], turned[2], turned[3], turned[0]);
+    assert!((turned * DVec3::X - joint.screw.axis).length() < 1e-6);
+    let at = DVec3::from_slice(&after(hinge, "point3f physics:localPos0"));
+    assert!(joint.screw.distance(at) < 1e-6);
+    assert_eq!(after(hinge, "float physics:upperLimit"), [1.5f64.to_degrees()]);
+    // Per degree: a hinge that turns 57 times as fast is held 57 times less.
+    let damper = after(hinge, "float drive:angular:physics:damping")[0];
+    assert!((damper.to_degrees() / hingecast_twin::link::damping(twin, joint) - 1.0).abs() < 1e-9);
+    for (part, link) in ["base", "lid"].into_iter().enumerate() {
+        let from = format!("def Xform \"{link}\"");
+        assert_eq!(after(&from, "float physics:mass"), [twin.parts[part].inertial.mass]);
+        assert!(text.contains(&format!("@./meshes/visual/part_{part}.png@")));
+        let moments: f64 = after(&from, "float3 physics:diagonalInertia").iter().sum();
+        let inertia = twin.parts[part].inertial.inertia;
+        let trace = inertia.x_axis.x + inertia.y_axis.y + inertia.z_axis.z;
+        assert!((moments / trace - 1.0).abs() < 1e-9);
+    }
+    let count = |c: char| text.chars().filter(|&x| x == c).count();
+    assert_eq!((count('{'), count('(')), (count('}'), count(')')));
 }
