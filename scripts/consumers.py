@@ -337,11 +337,15 @@ def with_usd_core(np, twin, path):
     wrong = UsdValidation.ValidationContext(validators).Validate(stage)
     if wrong:
         raise SystemExit(f"{wrong[0].GetName()}: {wrong[0].GetMessage()}")
-    shown = {p.GetMetadata("displayName"): p for p in stage.Traverse() if p.HasAuthoredMetadata("displayName")}
-    links = {n: next(p for p in stage.Traverse() if p.GetMetadata("displayName") == n and p.HasAPI(UsdPhysics.RigidBodyAPI)) for n in twin.names()}
-    joints = {n: next(p for p in stage.Traverse() if p.GetMetadata("displayName") == n and p.IsA(UsdPhysics.Joint)) for n in (j["name"] for j in twin.joints)}
+
+    def shown(name, kind):
+        named = (p for p in stage.Traverse() if p.GetMetadata("displayName") == name)
+        return next(p for p in named if kind(p))
+
+    links = {n: shown(n, lambda p: p.HasAPI(UsdPhysics.RigidBodyAPI)) for n in twin.names()}
+    joints = {j["name"]: shown(j["name"], lambda p: p.IsA(UsdPhysics.Joint)) for j in twin.joints}
     upright = np.array(UsdGeom.XformCache().GetLocalToWorldTransform(stage.GetDefaultPrim())).T
-    assert np.allclose(upright[:3, :3] @ twin.up, [0, 0, 1], atol=1e-6) and shown
+    assert np.allclose(upright[:3, :3] @ twin.up, [0, 0, 1], atol=1e-6)
 
     def frame(position, rotation):
         matrix = Gf.Matrix4d().SetRotate(Gf.Quatd(rotation.Get()))

@@ -135,7 +135,7 @@ pub fn build<E: From<Cancelled> + Send>(
     drop(fields);
     let points: Vec<Points> = meshes.iter().map(Points::of).collect();
     let tolerance = 2.0 * voxel;
-    let gains = exposure::gains(&meshes, &poses, config.color_views, tolerance, &shown)?;
+    let gains = exposure::gains(&points, &poses, config.color_views, tolerance, &shown)?;
     let evened = |most: usize, visit: &mut dyn FnMut(&[Observation])| -> Result<(), E> {
         let mut next = 0;
         shown(most, &mut |batch| {

@@ -3,8 +3,8 @@
 
 use crate::Observation;
 use crate::color::shows;
-use crate::vertices::{Glimpse, Shown};
-use hingecast_geom::{Pose, Projection, TriMesh};
+use crate::vertices::{Points, Shown};
+use hingecast_geom::{Pose, Projection};
 use rayon::prelude::*;
 
 /// Vertices of a part that are asked.
@@ -28,29 +28,24 @@ type Shades = [Vec<(u32, f32)>; 3];
 /// # Errors
 /// What `shown` answers.
 pub fn gains<E>(
-    meshes: &[TriMesh],
+    points: &[Points],
     poses: &[Vec<Pose>],
     views: usize,
     tolerance: f32,
     shown: &Shown<E>,
 ) -> Result<Vec<[f32; 3]>, E> {
-    let normals: Vec<_> = meshes.iter().map(TriMesh::vertex_normals).collect();
     let of_view = |seen: &Observation| {
         let (mut shades, mut next): (Shades, u32) = (Default::default(), 0);
-        for (part, mesh) in meshes.iter().enumerate() {
+        for (part, points) in points.iter().enumerate() {
             let camera = Projection::new(&seen.camera, &poses[seen.state][part]);
-            for i in (0..mesh.vertices.len()).step_by(mesh.vertices.len() / ASKED + 1) {
+            for i in (0..points.at.len()).step_by(points.at.len() / ASKED + 1) {
                 let id = next;
                 next += 1;
-                let x = camera.to_camera(mesh.vertices[i]);
-                let Some(pixel) = camera.pixel(x) else { continue };
-                let normal = camera.rot * normals[part][i];
-                let g = Glimpse { seen, part: part as u8, pixel, x, normal, rot: camera.rot };
-                if shows(&g, tolerance).is_none() {
+                let Some(g) = points.before(i, part, seen, &camera).filter(|g| shows(g, tolerance).is_some()) else {
                     continue;
-                }
+                };
                 for (k, shades) in shades.iter_mut().enumerate() {
-                    let value = seen.rgb[3 * pixel + k];
+                    let value = seen.rgb[3 * g.pixel + k];
                     if value > RANGE[0] && value < RANGE[1] {
                         shades.push((id, f32::from(value).ln()));
                     }
@@ -61,7 +56,7 @@ pub fn gains<E>(
     };
     let mut shades: Vec<Shades> = Vec::new();
     shown(views, &mut |batch| shades.extend(batch.par_iter().map(of_view).collect::<Vec<_>>()))?;
-    let asked = meshes.iter().map(|m| m.vertices.len().min(ASKED + 1)).sum();
+    let asked = points.iter().map(|p| p.at.len().min(ASKED + 1)).sum();
     let solved = [0, 1, 2].map(|k| solve(&shades.iter().map(|s| s[k].as_slice()).collect::<Vec<_>>(), asked));
     Ok((0..shades.len()).map(|view| [0, 1, 2].map(|k| solved[k][view])).collect())
 }

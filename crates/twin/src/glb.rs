@@ -5,7 +5,7 @@
 //! [`crate::export`]: a joint turns its node about the node's origin, or slides it.
 
 use crate::color::linear;
-use crate::link::link_origin;
+use crate::link::{drawn, link_origin};
 use crate::{PartModel, Twin};
 use glam::{DQuat, DVec3, Vec3};
 use hingecast_geom::JointKind;
@@ -98,12 +98,9 @@ impl File {
 
     /// The mesh of a part, relative to `origin`.
     fn mesh(&mut self, model: &PartModel, origin: DVec3) -> std::io::Result<usize> {
-        let local = |v: &Vec3| (v.as_dvec3() - origin).as_vec3().to_array();
         let mesh = &model.mesh;
-        let (positions, faces): (Vec<[f32; 3]>, _) = match &model.texture {
-            Some(t) => (t.vertices.iter().map(|&v| local(&mesh.vertices[v as usize])).collect(), &t.faces),
-            None => (mesh.vertices.iter().map(local).collect(), &mesh.faces),
-        };
+        let (positions, faces) = drawn(model, origin);
+        let positions: Vec<[f32; 3]> = positions.iter().map(Vec3::to_array).collect();
         let mut attributes = json!({ "POSITION": self.floats(&positions, Some(VERTICES)) });
         let mut look = json!({ "metallicFactor": 0.0, "roughnessFactor": 1.0 });
         if let Some(texture) = &model.texture {

@@ -4,8 +4,8 @@
 //! mass (revolute), at the centre of mass (prismatic), at the world origin (root). Mesh files are
 //! in link frames.
 
-use crate::Twin;
-use glam::DVec3;
+use crate::{PartModel, Twin};
+use glam::{DVec3, Vec3};
 use hingecast_geom::{Joint, KinematicTree, TriMesh};
 
 /// Origin of the link frame of `part`, canonical world.
@@ -74,4 +74,15 @@ pub(crate) fn texture_file(part: usize) -> String {
 
 pub(crate) fn hull_file(part: usize, hull: usize) -> String {
     format!("collision/part_{part}_{hull}.obj")
+}
+
+/// Points and triangles of a part as it is drawn, relative to `origin`: corners of its charts where it has a
+/// texture, else vertices of its mesh.
+pub(crate) fn drawn(model: &PartModel, origin: DVec3) -> (Vec<Vec3>, &[[u32; 3]]) {
+    let local = |v: &Vec3| (v.as_dvec3() - origin).as_vec3();
+    let vertices = &model.mesh.vertices;
+    match &model.texture {
+        Some(t) => (t.vertices.iter().map(|&v| local(&vertices[v as usize])).collect(), &t.faces),
+        None => (vertices.iter().map(local).collect(), &model.mesh.faces),
+    }
 }

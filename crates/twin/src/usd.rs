@@ -4,7 +4,7 @@
 //! A joint's axis is X of its own frame, which is turned onto the axis that was found, exactly:
 //! converters that take X, Y or Z of the link snap small tilts. Angles are degrees there.
 
-use crate::link::{damping, link_origin, touching};
+use crate::link::{damping, drawn, link_origin, touching};
 use crate::{PartModel, Twin};
 use glam::{DMat3, DQuat, DVec3, Quat, Vec3};
 use hingecast_geom::{Joint, JointKind, TriMesh};
@@ -95,30 +95,23 @@ fn visual(model: &PartModel, origin: DVec3, look: Option<&str>, out: &mut String
     let api =
         if look.is_some() { " (\n            prepend apiSchemas = [\"MaterialBindingAPI\"]\n        )" } else { "" };
     let _ = writeln!(out, "\n        def Mesh \"visual\"{api}\n        {{");
-    let mesh = &model.mesh;
-    match (&model.texture, look) {
-        (Some(texture), Some(look)) => {
-            let corners: Vec<Vec3> = texture.vertices.iter().map(|&v| mesh.vertices[v as usize]).collect();
-            surface(&corners, &texture.faces, origin, out);
-            let uv: Vec<String> = texture.corners.iter().map(|[u, v]| format!("({u:.6}, {v:.6})")).collect();
-            let _ = writeln!(
-                out,
-                "            texCoord2f[] primvars:st = [{}] (\n                interpolation = \"vertex\"\n            )\n            rel material:binding = {look}",
-                uv.join(", ")
-            );
-        }
-        _ => {
-            surface(&mesh.vertices, &mesh.faces, origin, out);
-            if mesh.colors.len() == mesh.vertices.len() {
-                let colors: Vec<String> =
-                    mesh.colors.iter().map(|c| single(Vec3::from(c.map(crate::color::linear)))).collect();
-                let _ = writeln!(
-                    out,
-                    "            color3f[] primvars:displayColor = [{}] (\n                interpolation = \"vertex\"\n            )",
-                    colors.join(", ")
-                );
-            }
-        }
+    let (points, faces) = drawn(model, origin);
+    surface(&points, faces, out);
+    if let (Some(texture), Some(look)) = (&model.texture, look) {
+        let uv: Vec<String> = texture.corners.iter().map(|[u, v]| format!("({u:.6}, {v:.6})")).collect();
+        let _ = writeln!(
+            out,
+            "            texCoord2f[] primvars:st = [{}] (\n                interpolation = \"vertex\"\n            )\n            rel material:binding = {look}",
+            uv.join(", ")
+        );
+    } else if model.mesh.colors.len() == model.mesh.vertices.len() {
+        let linear = |c: &[u8; 3]| single(Vec3::from(c.map(crate::color::linear)));
+        let colors: Vec<String> = model.mesh.colors.iter().map(linear).collect();
+        let _ = writeln!(
+            out,
+            "            color3f[] primvars:displayColor = [{}] (\n                interpolation = \"vertex\"\n            )",
+            colors.join(", ")
+        );
     }
     out.push_str("        }\n");
 }
@@ -128,15 +121,15 @@ fn collision(hull: &TriMesh, k: usize, origin: DVec3, out: &mut String) {
         out,
         "\n        def Mesh \"collision_{k}\" (\n            prepend apiSchemas = [\"PhysicsCollisionAPI\", \"PhysicsMeshCollisionAPI\"]\n        )\n        {{\n            uniform token physics:approximation = \"convexHull\"\n            uniform token purpose = \"guide\""
     );
-    surface(&hull.vertices, &hull.faces, origin, out);
+    let local: Vec<Vec3> = hull.vertices.iter().map(|v| (v.as_dvec3() - origin).as_vec3()).collect();
+    surface(&local, &hull.faces, out);
     out.push_str("        }\n");
 }
 
-/// Points and triangles of a mesh, relative to `origin`.
-fn surface(vertices: &[Vec3], faces: &[[u32; 3]], origin: DVec3, out: &mut String) {
-    let local: Vec<Vec3> = vertices.iter().map(|v| (v.as_dvec3() - origin).as_vec3()).collect();
-    let (lo, hi) = local.iter().fold((Vec3::INFINITY, Vec3::NEG_INFINITY), |(lo, hi), v| (lo.min(*v), hi.max(*v)));
-    let points: Vec<String> = local.iter().map(|v| single(*v)).collect();
+/// Points and triangles of a mesh.
+fn surface(points: &[Vec3], faces: &[[u32; 3]], out: &mut String) {
+    let (lo, hi) = points.iter().fold((Vec3::INFINITY, Vec3::NEG_INFINITY), |(lo, hi), v| (lo.min(*v), hi.max(*v)));
+    let points: Vec<String> = points.iter().map(|v| single(*v)).collect();
     let indices: Vec<String> = faces.iter().flatten().map(u32::to_string).collect();
     let _ = writeln!(
         out,

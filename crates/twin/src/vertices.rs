@@ -22,6 +22,14 @@ impl Points {
     pub fn of(mesh: &TriMesh) -> Self {
         Self { at: mesh.vertices.clone(), normals: mesh.vertex_normals() }
     }
+
+    /// Point `i`, of `part`, before the pixel of `seen` that it falls on, if that is in the picture. `camera`:
+    /// the projection of `seen` from the frame in which the points are stored.
+    pub fn before<'a>(&self, i: usize, part: usize, seen: &'a Observation, camera: &Projection) -> Option<Glimpse<'a>> {
+        let x = camera.to_camera(self.at[i]);
+        let pixel = camera.pixel(x)?;
+        Some(Glimpse { seen, part: part as u8, pixel, x, normal: camera.rot * self.normals[i], rot: camera.rot })
+    }
 }
 
 /// A point before a pixel: in front of the camera and in the picture, but perhaps behind
@@ -59,10 +67,8 @@ pub fn collect<T: Clone + Default + Send, E>(
             for seen in batch {
                 let camera = Projection::new(&seen.camera, &poses[seen.state][part]);
                 all.par_iter_mut().enumerate().with_min_len(1024).for_each(|(i, own)| {
-                    let x = camera.to_camera(points.at[i]);
-                    if let Some(pixel) = camera.pixel(x) {
-                        let normal = camera.rot * points.normals[i];
-                        say(own, &Glimpse { seen, part: part as u8, pixel, x, normal, rot: camera.rot });
+                    if let Some(glimpse) = points.before(i, part, seen, &camera) {
+                        say(own, &glimpse);
                     }
                 });
             }
