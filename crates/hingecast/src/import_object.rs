@@ -12,8 +12,9 @@ use hingecast_capture::object::{ArticulatedObject, PartGeometry};
 use hingecast_capture::synth::{UsefulRange, useful_ranges};
 use hingecast_geom::folder::{may_be_emptied, may_become};
 use hingecast_geom::{JointKind, KinematicTree, Progress, TriMesh};
-use hingecast_twin::hulls::{HullConfig, convex, decompose};
+use hingecast_twin::hulls::{convex, decompose};
 use hingecast_twin::link::touching;
+use hingecast_twin::pieces;
 use hingecast_twin::separate::separate;
 use hingecast_twin::{Inertial, PartModel, Twin, mass};
 use rayon::prelude::*;
@@ -31,6 +32,11 @@ const CRUMB: f64 = 0.01;
 const MOST_CONVEX: usize = 64;
 /// The most details of a part that get pieces of their own, largest first.
 const MOST_DETAILS: usize = 24;
+/// The most convex pieces of a part's concave rest, and of one detail.
+const MOST_PIECES: usize = 24;
+const MOST_OF_DETAIL: usize = 8;
+/// How far pieces may stand out of a surface, share of its diagonal.
+const REACH: f32 = 0.003;
 
 /// How an object is made fit for the simulator.
 #[derive(Clone, Copy, Debug, Serialize)]
@@ -302,10 +308,13 @@ fn collision(mesh: &TriMesh, diagonal: f64) -> Vec<TriMesh> {
     for shell in rest.iter().chain(&spare).chain(details.iter().filter(|_| all_small)) {
         body.append(shell);
     }
-    hulls.extend(decompose(&body, &HullConfig::default()).0);
+    let pieces_of = |mesh: &TriMesh, most: usize| {
+        let config = pieces::Config { reach: REACH * size(mesh), most };
+        decompose(mesh, &config).0
+    };
+    hulls.extend(pieces_of(&body, MOST_PIECES));
     if !all_small {
-        let fine = HullConfig { resolution: 64, concavity: 0.005, max_hulls: 8 };
-        hulls.extend(details.iter().flat_map(|d| decompose(d, &fine).0));
+        hulls.extend(details.iter().flat_map(|d| pieces_of(d, MOST_OF_DETAIL)));
     }
     hulls
 }

@@ -3,8 +3,8 @@
 use crate::field::Field;
 use crate::vertices::Points;
 use crate::{
-    Inertial, Observation, PartModel, Twin, clearance, color, exposure, fuse, hulls, mass, separate, simplify, snap,
-    solid, surface, texture, vertices,
+    Inertial, Observation, PartModel, Twin, clearance, color, exposure, fuse, hulls, mass, pieces, separate, simplify,
+    snap, solid, surface, texture, vertices,
 };
 use glam::{DMat3, DVec3};
 use hingecast_geom::{Cancelled, KinematicTree, Pose, Progress, TriMesh};
@@ -39,6 +39,8 @@ pub struct Config {
 /// within this many voxels of its plane.
 const SNAP_VIEWS: usize = 480;
 const SNAP_REACH: f32 = 1.5;
+/// Collision pieces may stand out of the surface by so many voxels: it is known no better.
+const REACH: f32 = 0.5;
 /// Share of the collision volume that may be cut away without a word.
 const LOST: f64 = 0.02;
 
@@ -49,7 +51,7 @@ impl Default for Config {
             density: 500.0,
             max_faces: 20_000,
             simplify_error: 5e-4,
-            max_hulls: 48,
+            max_hulls: 24,
             crumbs: 0.02,
             color_views: 160,
             max_texels: 4_000_000,
@@ -151,9 +153,9 @@ pub fn build<E: From<Cancelled> + Send>(
     let most = texture::Most { texels: config.max_texels, views: config.color_views };
     let textures = texture::paint(&meshes, &sums, &poses, &most, tolerance, &evened, progress)?;
 
-    let hull_config = hulls::HullConfig { max_hulls: config.max_hulls, ..Default::default() };
+    let closely = pieces::Config { reach: REACH * voxel, most: config.max_hulls as usize };
     let decomposed: Vec<(Vec<TriMesh>, usize)> =
-        collision.par_iter().map(|mesh| hulls::decompose(mesh, &hull_config)).collect();
+        collision.par_iter().map(|mesh| hulls::decompose(mesh, &closely)).collect();
     let (mut pieces, flat): (Vec<Vec<TriMesh>>, Vec<usize>) = decomposed.into_iter().unzip();
     let root_first: Vec<usize> = order.iter().rev().copied().collect();
     let solid = |pieces: &[Vec<TriMesh>]| pieces.iter().flatten().map(|h| h.mass_integrals().volume).sum::<f64>();

@@ -62,6 +62,7 @@
 pub mod build;
 pub mod clearance;
 mod color;
+pub mod cuboid;
 pub mod export;
 mod exposure;
 mod field;
@@ -71,6 +72,7 @@ pub mod hulls;
 pub mod link;
 pub mod mass;
 pub mod mjcf;
+pub mod pieces;
 pub mod relabel;
 pub mod separate;
 pub mod simplify;

@@ -1,8 +1,8 @@
 //! MJCF text of a twin: the same links and joints as the URDF, for MuJoCo.
 
-use crate::Twin;
 use crate::link::{armature, damping, hull_file, link_origin, mean_color, texture_file, touching, visual_file};
 use crate::xml::{escape, xyz};
+use crate::{Twin, cuboid};
 use glam::DVec3;
 use hingecast_geom::JointKind;
 use std::fmt::Write as _;
@@ -26,7 +26,7 @@ pub fn to_string(twin: &Twin) -> String {
                 "    <material name=\"photo_{i}\" texture=\"photo_{i}\" specular=\"0\" shininess=\"0\"/>"
             );
         }
-        for k in 0..part.hulls.len() {
+        for k in (0..part.hulls.len()).filter(|&k| cuboid::of(&part.hulls[k]).is_none()) {
             let _ = writeln!(out, "    <mesh name=\"hull_{i}_{k}\" file=\"{}\" inertia=\"convex\"/>", hull_file(i, k));
         }
     }
@@ -102,11 +102,19 @@ fn body(twin: &Twin, part: usize, parent_origin: DVec3, depth: usize, out: &mut 
         out,
         "{pad}  <geom name=\"visual_{part}\" type=\"mesh\" mesh=\"visual_{part}\" contype=\"0\" conaffinity=\"0\" group=\"2\" density=\"0\" {look}/>"
     );
-    for k in 0..model.hulls.len() {
-        let _ = writeln!(
-            out,
-            "{pad}  <geom name=\"hull_{part}_{k}\" type=\"mesh\" mesh=\"hull_{part}_{k}\" group=\"3\" {plain}/>"
-        );
+    for (k, hull) in model.hulls.iter().enumerate() {
+        let shape = match cuboid::of(hull) {
+            Some(c) => {
+                let [size, pos] = [c.half, c.centre - origin].map(xyz);
+                let q = c.rot;
+                format!(
+                    "type=\"box\" size=\"{size}\" pos=\"{pos}\" quat=\"{:.9} {:.9} {:.9} {:.9}\"",
+                    q.w, q.x, q.y, q.z
+                )
+            }
+            None => format!("type=\"mesh\" mesh=\"hull_{part}_{k}\""),
+        };
+        let _ = writeln!(out, "{pad}  <geom name=\"hull_{part}_{k}\" {shape} group=\"3\" {plain}/>");
     }
     for joint in twin.tree.joints.iter().filter(|j| j.parent == part) {
         body(twin, joint.child, origin, depth + 1, out);

@@ -1,9 +1,10 @@
 //! URDF text of a twin. Written by hand: the format is small, and the reader in the tests is
 //! someone else's.
 
-use crate::Twin;
 use crate::link::{damping, hull_file, link_origin, mean_color, visual_file};
 use crate::xml::{escape, xyz};
+use crate::{Twin, cuboid};
+use glam::{DVec3, EulerRot};
 use hingecast_geom::JointKind;
 use std::fmt::Write as _;
 
@@ -45,12 +46,16 @@ pub fn to_string(twin: &Twin) -> String {
             "    <visual><geometry><mesh filename=\"{}\"/></geometry>{material}</visual>",
             path(&visual_file(i))
         );
-        for k in 0..part.hulls.len() {
-            let _ = writeln!(
-                out,
-                "    <collision><geometry><mesh filename=\"{}\"/></geometry></collision>",
-                path(&hull_file(i, k))
-            );
+        for (k, hull) in part.hulls.iter().enumerate() {
+            let shape = match cuboid::of(hull) {
+                Some(c) => {
+                    let (yaw, pitch, roll) = c.rot.to_euler(EulerRot::ZYX);
+                    let [size, at, rpy] = [2.0 * c.half, c.centre - origin, DVec3::new(roll, pitch, yaw)].map(xyz);
+                    format!("<origin xyz=\"{at}\" rpy=\"{rpy}\"/><geometry><box size=\"{size}\"/></geometry>")
+                }
+                None => format!("<geometry><mesh filename=\"{}\"/></geometry>", path(&hull_file(i, k))),
+            };
+            let _ = writeln!(out, "    <collision>{shape}</collision>");
         }
         let _ = writeln!(out, "  </link>");
     }
