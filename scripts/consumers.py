@@ -25,7 +25,8 @@ CONSUMERS = {
     "mujoco 3.17.0": (["mujoco==3.17.0"], ["robot.xml", "robot.urdf"]),
     "mujoco 4.0": (["mujoco>=4.0,<4.1"], ["robot.xml", "robot.urdf"]),
     "dm_control": (["dm_control", "mujoco==3.17.0"], ["robot.xml"]),
-    "drake": (["drake"], ["robot.urdf", "robot.xml"]),
+    "robosuite": (["robosuite==1.5.2", "mujoco==3.3.7"], ["robosuite_object.py"]),
+    "drake": (["drake"], ["robot.urdf", "robot.xml", "robot.sdf"]),
     "pin": (["pin"], ["robot.urdf"]),
     "yourdfpy": (["yourdfpy==0.0.60"], ["robot.urdf"]),
     "pybullet": (["pybullet"], ["robot.urdf"]),
@@ -194,15 +195,15 @@ def with_mujoco(np, twin, path):
     return of_mujoco(np, twin, mujoco, model, mujoco.MjData(model), mujoco.__version__)
 
 
-def of_mujoco(np, twin, mujoco, model, data, version):
+def of_mujoco(np, twin, mujoco, model, data, version, prefix=""):
     poses = []
     for q in twin.configurations():
         for name, value in twin.named(q).items():
-            data.joint(name).qpos[0] = value
+            data.joint(prefix + name).qpos[0] = value
         mujoco.mj_kinematics(model, data)
-        bodies = {name: data.body(name) for name in twin.names()}
+        bodies = {name: data.body(prefix + name) for name in twin.names()}
         poses.append({n: pose_of(np, b.xmat.reshape(3, 3), b.xpos).tolist() for n, b in bodies.items()})
-    ids = [model.body(name).id for name in twin.names()]
+    ids = [model.body(prefix + name).id for name in twin.names()]
     colours = f"{model.ntex} textures" if model.ntex else "mean colours"
     return {
         "version": version,
@@ -222,6 +223,34 @@ def with_dm_control(np, twin, path):
     physics = mjcf.Physics.from_xml_path(str(path))
     model, data = physics.model.ptr, physics.data.ptr
     return of_mujoco(np, twin, mujoco, model, data, importlib.metadata.version("dm_control"))
+
+
+def with_robosuite(np, twin, path):
+    """As an object of a world, poses relative to its base."""
+    import contextlib
+    import importlib.util
+    import os
+
+    with contextlib.redirect_stdout(open(os.devnull, "w")):
+        import mujoco
+        import robosuite
+        from robosuite.models.base import MujocoXML
+        from robosuite.models.world import MujocoWorldBase
+
+    spec = importlib.util.spec_from_file_location("robosuite_object", path)
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    thing = module.Twin("thing")
+    assert len(thing.hinges) == len(twin.joints) and thing.top_offset[2] > 0, (thing.hinges, thing.top_offset)
+    world = MujocoWorldBase()
+    MujocoXML.merge_assets(world, thing)
+    world.worldbody.append(thing.get_obj())
+    model = world.get_model(mode="mujoco")
+
+    seen = of_mujoco(np, twin, mujoco, model, mujoco.MjData(model), robosuite.__version__, thing.naming_prefix)
+    base = twin.names()[root_of(twin)]
+    seen["poses"] = [{n: np.linalg.inv(p[base]) @ np.array(x) for n, x in p.items()} for p in seen["poses"]]
+    return seen
 
 
 def with_drake(np, twin, path):

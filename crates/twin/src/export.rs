@@ -1,16 +1,16 @@
-//! The twin folder: `twin.json`, `robot.{urdf,xml,glb,usda}`, `meshes/{visual,collision}`,
-//! `splats/<part>.ply`.
+//! The twin folder: `twin.json`, `robot.{urdf,xml,sdf,glb,usda}`, `robosuite.xml` and `robosuite_object.py`,
+//! `meshes/{visual,collision}`, `splats/<part>.ply`.
 //!
 //! Link frames: axes of the canonical world; origin on the joint axis nearest the part's centre of
 //! mass (revolute), at the centre of mass (prismatic), at the world origin (root). Mesh files are
 //! in link frames.
 
 use crate::link::{hull_file, link_origin, mean_color, texture_file, visual_file};
-use crate::{PartModel, Twin, glb, mjcf, texture, urdf, usd};
+use crate::{PartModel, Twin, glb, mjcf, sdf, texture, urdf, usd};
 use glam::{DVec3, Vec3};
 use hingecast_geom::ply::PlyError;
 use hingecast_geom::staging::{Staging, write_whole};
-use hingecast_geom::{Gaussians, Pose, TriMesh};
+use hingecast_geom::{Gaussians, JointKind, Pose, TriMesh};
 use serde_json::json;
 use std::path::{Path, PathBuf};
 
@@ -69,6 +69,9 @@ pub fn write(twin: &Twin, splats: Option<(&Gaussians, &[u8])>, dir: &Path) -> Re
     file("robot.urdf", urdf::to_string(twin).into_bytes())?;
     file("robot.usda", usd::to_string(twin).into_bytes())?;
     file("robot.xml", mjcf::to_string(twin).into_bytes())?;
+    file("robot.sdf", sdf::to_string(twin).into_bytes())?;
+    file("robosuite.xml", mjcf::for_robosuite(twin).into_bytes())?;
+    file("robosuite_object.py", robosuite_object(twin).into_bytes())?;
     file("robot.glb", glb::to_bytes(twin).map_err(at(&staging.join("robot.glb")))?)?;
     let summary = serde_json::to_string_pretty(&summary(twin)).expect("plain data") + "\n";
     file("twin.json", summary.into_bytes())?;
@@ -83,7 +86,10 @@ pub fn is_ours(path: &Path) -> bool {
             .any(|end| name.strip_prefix("part_").and_then(|n| n.strip_suffix(end)).is_some_and(|n| !n.is_empty()))
     };
     match names.as_deref() {
-        Some(["twin.json" | "robot.glb" | "robot.urdf" | "robot.usda" | "robot.xml"]) => true,
+        Some(
+            ["twin.json" | "robot.glb" | "robot.sdf" | "robot.urdf" | "robot.usda" | "robot.xml" | "robosuite.xml"
+            | "robosuite_object.py"],
+        ) => true,
         Some(["meshes", "visual", name]) => part(name, &[".obj", ".mtl", ".png", ".ply"]),
         Some(["meshes", "collision", name]) => part(name, &[".obj"]),
         Some(["splats", name]) => part(name, &[".ply"]),
@@ -112,6 +118,14 @@ fn write_part(dir: &Path, index: usize, part: &PartModel, origin: DVec3) -> Resu
         local(hull).write_obj(&path).map_err(|source| ExportError::Io { path: path.clone(), source })?;
     }
     Ok(())
+}
+
+/// The class that robosuite loads, with the names of the joints.
+fn robosuite_object(twin: &Twin) -> String {
+    let moving = twin.tree.joints.iter().filter(|j| j.screw.kind != JointKind::Fixed);
+    let names: Vec<&str> = moving.map(|j| j.name.as_str()).collect();
+    let names = serde_json::to_string(&names).expect("plain data");
+    format!("{}JOINTS = {names}\n", include_str!("robosuite_object.py"))
 }
 
 /// A millimetre cube for a part without surface: loaders refuse empty meshes.

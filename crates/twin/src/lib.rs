@@ -74,6 +74,7 @@ pub mod mass;
 pub mod mjcf;
 pub mod pieces;
 pub mod relabel;
+pub mod sdf;
 pub mod separate;
 pub mod simplify;
 mod slabs;
