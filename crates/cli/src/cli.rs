@@ -87,6 +87,8 @@ pub enum Verb {
     Eval(Eval),
     /// Write the report of a run again.
     Report(Report),
+    /// Write a page in which the parts of a twin are dragged along their joints: one file, any browser.
+    View(View),
     /// Record demonstrations of the robot arm opening an object or its twin; `--inspect` lists,
     /// plots and replays them.
     Demos(Demos),
@@ -335,6 +337,15 @@ pub struct Eval {
 pub struct Report {
     /// Run folder, the -o of `hingecast build`.
     pub run: PathBuf,
+}
+
+#[derive(Args, Debug)]
+pub struct View {
+    /// Run folder, the -o of `hingecast build`, or a folder with a twin.json.
+    pub path: PathBuf,
+    /// The page [default: RUN/report/view.html, or view.html beside the twin.json].
+    #[arg(long, short)]
+    pub out: Option<PathBuf>,
 }
 
 #[cfg(test)]

@@ -51,6 +51,7 @@ pub mod report;
 pub mod run_files;
 pub mod stage;
 pub mod stages;
+pub mod view;
 pub mod watcher;
 
 pub use build::{Options, Stage, build};

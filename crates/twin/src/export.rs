@@ -88,10 +88,11 @@ pub fn is_ours(path: &Path) -> bool {
     match names.as_deref() {
         Some(
             ["twin.json" | "robot.glb" | "robot.sdf" | "robot.urdf" | "robot.usda" | "robot.xml" | "robosuite.xml"
-            | "robosuite_object.py"],
+            | "robosuite_object.py" | "view.html"],
         ) => true,
         Some(["meshes", "visual", name]) => part(name, &[".obj", ".mtl", ".png", ".ply"]),
-        Some(["meshes", "collision", name]) => part(name, &[".obj"]),
+        // Older versions wrote STL.
+        Some(["meshes", "collision", name]) => part(name, &[".obj", ".stl"]),
         Some(["splats", name]) => part(name, &[".ply"]),
         _ => false,
     }

@@ -86,6 +86,14 @@ pub fn run(cli: &Cli) -> Result<Outcome> {
             session.answer(&serde_json::json!({ "report": path }))?;
             Ok(Outcome::Done)
         }
+        Verb::View(args) => {
+            let (twin, place) = hingecast::view::place(&args.path)?;
+            let page = args.out.clone().unwrap_or(place);
+            hingecast::view::write(&twin, &page)?;
+            session.ui.say(&format!("page: {}", page.display()));
+            session.answer(&serde_json::json!({ "page": page }))?;
+            Ok(Outcome::Done)
+        }
         #[cfg(feature = "mujoco")]
         Verb::Demos(args) => demos::run(&session, args),
         #[cfg(not(feature = "mujoco"))]

@@ -14,6 +14,9 @@ pub struct TwinFile {
     pub name: String,
     /// Of the object's box in the first state, scene units.
     pub diagonal: f64,
+    /// Unit vector, canonical world; older twins do not say.
+    #[serde(default = "z")]
+    pub up: DVec3,
     /// Parts and joints, with values of all states.
     pub tree: KinematicTree,
     /// Gravest first.
@@ -32,6 +35,9 @@ pub struct PartFile {
     pub name: String,
     /// Origin of its link's frame, canonical world, scene units.
     pub link_origin: [f64; 3],
+    /// Centre of mass, canonical world, scene units; older twins do not say.
+    #[serde(default)]
+    pub com: [f64; 3],
     /// OBJ below the twin's folder; a PLY lies beside it.
     pub visual: String,
     /// Convex pieces below the twin's folder.
@@ -46,17 +52,33 @@ pub struct PartFile {
     pub faces: usize,
 }
 
+fn z() -> DVec3 {
+    DVec3::Z
+}
+
 impl TwinFile {
     /// Of a finished run.
     ///
     /// # Errors
     /// When the file is missing or not ours.
     pub fn read(run: &Path) -> Result<Self> {
-        read_checked(&Self::file(run), |twin: &Self| {
+        Self::read_in(&run.join("twin"))
+    }
+
+    /// Of the folder that a twin is in.
+    ///
+    /// # Errors
+    /// As [`Self::read`].
+    pub fn read_in(folder: &Path) -> Result<Self> {
+        read_checked(&folder.join("twin.json"), |twin: &Self| {
             check::tree(&twin.tree)?;
             check::as_many("parts", twin.parts.len(), "parts of its tree", twin.tree.parts.len())?;
             check::finite("the diagonal", &[twin.diagonal])?;
-            twin.parts.iter().try_for_each(|p| check::finite("a link's origin", &p.link_origin))
+            check::finite("which way is up", &twin.up.to_array())?;
+            twin.parts.iter().try_for_each(|p| {
+                check::finite("a link's origin", &p.link_origin)?;
+                check::finite("a centre of mass", &p.com)
+            })
         })
     }
 

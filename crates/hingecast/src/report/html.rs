@@ -34,6 +34,7 @@ pub fn head(title: &str) -> String {
 
 pub(crate) fn page(run: &RunFolder, content: &Content) -> String {
     let mut out = head(&content.twin.name);
+    out.push_str("<p><a href=\"view.html\">Move its parts</a>: surfaces, collision pieces, axes, states.</p>");
     doubts(&mut out, &run.record.doubts);
     let _ = write!(out, "<h2>Parts and axes on the photos</h2>");
     for (file, caption) in &content.overlays {

@@ -105,6 +105,7 @@ pub fn write(run: &RunFolder) -> Result<PathBuf> {
     let metric = recording.metric;
     let content = Content { twin, metric, overlays, held_out, plot, trace: Parts::read_trace(&run.root) };
     let path = folder.join("index.html");
+    crate::view::write(&run.root.join("twin"), &folder.join("view.html"))?;
     let text = html::page(run, &content);
     hingecast_geom::staging::write_whole(&path, text.as_bytes()).map_err(Failure::io(&path))?;
     Ok(path)
