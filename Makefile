@@ -21,7 +21,7 @@ FUZZ_SECONDS ?= 60
 TORTURE_FLAGS ?=
 DENY := third_party/cargo-deny/bin/cargo-deny
 
-.PHONY: help setup build demo test fmt circles deny clippy doc tests advisories fuzz torture bench clean
+.PHONY: help setup build demo test fmt circles deny clippy doc tests advisories fuzz torture bench web clean
 
 help:
 	@echo 'make demo    record a sample object (OBJECT=$(OBJECT)), build its twin, write the report'
@@ -30,6 +30,7 @@ help:
 	@echo 'make bench   quality and time of a suite (SUITE=$(SUITE)); BENCH_FLAGS="--against baseline.json" compares'
 	@echo 'make fuzz    damaged files for every reader, FUZZ_SECONDS=$(FUZZ_SECONDS) in all; FUZZ_TARGETS="ply_mesh urdf" picks'
 	@echo 'make torture kills, full disks, damaged files, swapped runs; TORTURE_FLAGS="--quick" is a tenth of it'
+	@echo 'make web     the page of `hingecast view` out of web/ (needs npm); the result is checked in'
 	@echo 'make clean   forget what was built; recordings and runs stay'
 	@echo
 	@echo 'one check alone: make fmt | circles | deny | clippy | doc | tests; make advisories asks the network for known holes'
@@ -61,6 +62,11 @@ fmt:
 # No file imports in a circle.
 circles:
 	python3 scripts/import_circles.py
+	python3 scripts/page_is_current.py
+
+# The page of `hingecast view`, from web/; needs node and npm. What it writes is checked in.
+web:
+	cd web && npm ci --no-audit --no-fund && npm run build
 
 # What deny.toml allows, of the programs and of the fuzz targets. Duplicates are warnings there, and not shown.
 deny:

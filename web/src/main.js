@@ -19,7 +19,16 @@ async function start() {
 
   let q = view.joints.map(() => 0);
   let held = null;
-  const draw = () => renderer.render(view.scene, camera);
+  // Once a frame, however often it is asked for.
+  let asked = false;
+  const draw = () => {
+    if (asked) return;
+    asked = true;
+    requestAnimationFrame(() => {
+      asked = false;
+      renderer.render(view.scene, camera);
+    });
+  };
   const side = panel(document.getElementById("panel"), twin, view.joints, {
     set: (k, value) => move(k, value),
     state: (s) => all(view.joints.map((j) => j.values[s])),
@@ -116,6 +125,7 @@ async function start() {
     get values() { return q; },
     set: move,
     pixel(part, point) {
+      camera.updateMatrixWorld();
       const p = view.nodes[part].localToWorld(new THREE.Vector3(...point)).project(camera);
       return [((p.x + 1) / 2) * place.clientWidth, ((1 - p.y) / 2) * place.clientHeight];
     },

@@ -6,10 +6,13 @@ const make = (tag, props = {}, ...children) => {
 };
 const degrees = (x) => (x * 180) / Math.PI;
 
+// Digits of a number; none of them make a minus zero.
+const fixed = (x, digits) => x.toFixed(digits).replace(/^-(0\.?0*)$/, "$1");
+
 // A joint's value in words.
 export function words(joint, value, metric) {
-  if (joint.turns) return `${degrees(value).toFixed(1)}°`;
-  return metric ? `${(1000 * value).toFixed(1)} mm` : value.toFixed(4);
+  if (joint.turns) return `${fixed(degrees(value), 1)}°`;
+  return metric ? `${fixed(1000 * value, 1)} mm` : fixed(value, 4);
 }
 
 // How sure its axis is, or nothing: two standard deviations.

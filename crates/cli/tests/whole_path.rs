@@ -81,6 +81,12 @@ fn synth_check_build_eval_report() {
         assert!(check.geoms > 0, "{check:?}");
         assert_eq!(check.warnings, Vec::<String>::new(), "{}", check.file);
     }
+    #[cfg(feature = "mujoco")]
+    {
+        let file = twin.join("robosuite.xml");
+        let check = hingecast_sim::check_file(&file, &hingecast_sim::CheckConfig::default()).unwrap();
+        assert!(check.finite && check.warnings.is_empty(), "{check:?}");
+    }
     // The photographs are on it.
     for part in 0..2 {
         let [obj, picture] = ["obj", "png"].map(|end| twin.join(format!("meshes/visual/part_{part}.{end}")));
@@ -122,6 +128,18 @@ fn synth_check_build_eval_report() {
         assert!(!file.contains("://"), "the report needs no network: {file}");
         assert!(dir.join("run/report").join(&file).is_file(), "{file} is not there");
     }
+
+    // A page to take it by its handles: whole, without a network, of a run and of a twin alone.
+    assert_eq!(hingecast(dir, "view run --json").done().json()["page"], "run/report/view.html");
+    hingecast(dir, "view run/twin -o alone.html").done();
+    let (page, alone) = (text(&dir.join("run/report/view.html")), text(&dir.join("alone.html")));
+    assert_eq!(page, alone);
+    let said = page.split("id=\"twin\">").nth(1).unwrap().split("</script>").next().unwrap();
+    let said: serde_json::Value = serde_json::from_str(said).unwrap();
+    assert_eq!((&said["tree"], said["collision"].as_array().unwrap().len()), (&json["tree"], 2));
+    assert!(!page.contains("<!--"), "a mark was left unfilled");
+    let nowhere = hingecast(dir, "view rec");
+    assert_eq!((nowhere.code, nowhere.stderr.lines().count()), (Some(2), 3), "{nowhere}");
 
     // The same command again changes nothing and is quick about it.
     let again = hingecast(dir, &format!("build rec -o run {TINY} {PHOTOGRAPHS}")).done();

@@ -87,8 +87,17 @@ pub fn is_ours(path: &Path) -> bool {
     };
     match names.as_deref() {
         Some(
-            ["twin.json" | "robot.glb" | "robot.sdf" | "robot.urdf" | "robot.usda" | "robot.xml" | "robosuite.xml"
-            | "robosuite_object.py" | "view.html"],
+            [
+                "twin.json"
+                | "robot.glb"
+                | "robot.sdf"
+                | "robot.urdf"
+                | "robot.usda"
+                | "robot.xml"
+                | "robosuite.xml"
+                | "robosuite_object.py"
+                | "view.html",
+            ],
         ) => true,
         Some(["meshes", "visual", name]) => part(name, &[".obj", ".mtl", ".png", ".ply"]),
         // Older versions wrote STL.

@@ -66,9 +66,11 @@ pub fn for_robosuite(twin: &Twin) -> String {
     let upright = DQuat::from_rotation_arc(twin.up, DVec3::Z);
     // In the first state.
     let poses = twin.tree.poses(&vec![0.0; twin.tree.joints.len()]);
-    let points = twin.parts.iter().zip(&poses).flat_map(|(part, pose)| {
-        part.mesh.vertices.iter().map(move |v| upright * pose.apply(v.as_dvec3()))
-    });
+    let points = twin
+        .parts
+        .iter()
+        .zip(&poses)
+        .flat_map(|(part, pose)| part.mesh.vertices.iter().map(move |v| upright * pose.apply(v.as_dvec3())));
     let (lo, hi) = points.fold((DVec3::MAX, DVec3::MIN), |(lo, hi), x| (lo.min(x), hi.max(x)));
     let (lo, hi) = if lo.cmple(hi).all() { (lo, hi) } else { (DVec3::ZERO, DVec3::ZERO) };
     let foot = ((lo + hi) / 2.0).with_z(lo.z);

@@ -121,6 +121,7 @@ fn are_read_by_others(twin: &Twin) {
         assert_eq!(rgb, texture.rgb);
     }
     is_read_as_gltf(twin, &folder.join("robot.glb"));
+    says_what_sdf_asks(twin, folder);
     says_what_usd_asks(twin, &std::fs::read_to_string(folder.join("robot.usda")).unwrap());
     // A material of the URDF would lie over that of the OBJ.
     assert!(!std::fs::read_to_string(folder.join("robot.urdf")).unwrap().contains("<material"));
@@ -253,4 +254,23 @@ fn says_what_usd_asks(twin: &Twin, text: &str) {
     }
     let count = |c: char| text.chars().filter(|&x| x == c).count();
     assert_eq!((count('{'), count('(')), (count('}'), count(')')));
+}
+
+/// Links and joints by name, and files that are there.
+fn says_what_sdf_asks(twin: &Twin, folder: &std::path::Path) {
+    let text = std::fs::read_to_string(folder.join("robot.sdf")).unwrap();
+    let file = roxmltree::Document::parse(&text).unwrap();
+    let named = |tag: &str| -> Vec<String> {
+        let all = file.descendants().filter(|n| n.has_tag_name(tag));
+        all.filter_map(|n| n.attribute("name")).map(str::to_string).collect()
+    };
+    assert_eq!(named("link"), twin.tree.parts);
+    assert_eq!(named("joint"), ["base_stands", "hinge"]);
+    let uris = file.descendants().filter(|n| n.has_tag_name("uri")).filter_map(|n| n.text());
+    assert!(uris.map(|uri| folder.join(uri)).all(|file| file.is_file()));
+    let masses = file.descendants().filter(|n| n.has_tag_name("mass")).filter_map(|n| n.text()?.parse::<f64>().ok());
+    let mass: f64 = twin.parts.iter().map(|p| p.inertial.mass).sum();
+    assert!((masses.sum::<f64>() / mass - 1.0).abs() < 1e-8);
+    // Boxes are boxes: the walls of this one.
+    assert!(file.descendants().any(|n| n.has_tag_name("box")), "{text}");
 }

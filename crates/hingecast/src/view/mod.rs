@@ -40,10 +40,11 @@ pub fn write(twin: &Path, out: &Path) -> Result<()> {
     let data = serde_json::to_string(&said).expect("plain data").replace("</", "<\\/");
     let title = crate::report::html::escape(&checked.name);
     // The twin last: a name that looks like a mark stays one.
-    let page = PAGE
-        .replacen("<!--TITLE-->", &title, 1)
-        .replacen("<!--GLB-->", &STANDARD.encode(bytes), 1)
-        .replacen("<!--TWIN-->", &data, 1);
+    let page = PAGE.replacen("<!--TITLE-->", &title, 1).replacen("<!--GLB-->", &STANDARD.encode(bytes), 1).replacen(
+        "<!--TWIN-->",
+        &data,
+        1,
+    );
     write_whole(out, page.as_bytes()).map_err(Failure::io(out))
 }
 
