@@ -40,6 +40,7 @@ pub mod artifacts;
 pub mod build;
 pub mod chart;
 pub mod config;
+pub mod escape;
 pub mod eval;
 pub mod failure;
 pub mod import_object;

@@ -121,7 +121,7 @@ fn are_read_by_others(twin: &Twin) {
         assert_eq!(rgb, texture.rgb);
     }
     is_read_as_gltf(twin, &folder.join("robot.glb"));
-    says_what_sdf_asks(twin, folder);
+    says_what_sdf_asks(twin, &folder);
     says_what_usd_asks(twin, &std::fs::read_to_string(folder.join("robot.usda")).unwrap());
     // A material of the URDF would lie over that of the OBJ.
     assert!(!std::fs::read_to_string(folder.join("robot.urdf")).unwrap().contains("<material"));

@@ -2,8 +2,9 @@
 
 use super::raw_depths::RawDepths;
 use super::sheet::{SHEET_CAPTION, write_contact_sheet};
+use crate::escape::escape;
 use crate::failure::{Failure, Result};
-use crate::report::html::{doubts, escape, head};
+use crate::report::html::{doubts, head};
 use glam::{DVec2, DVec3};
 use hingecast_articulate::{Depths, OBJECT};
 use hingecast_capture::check::CheckReport;

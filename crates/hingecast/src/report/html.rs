@@ -1,6 +1,7 @@
 //! The page: plain HTML with its style inside, readable without scripts.
 
 use super::{Content, draw::PALETTE};
+use crate::escape::escape;
 use crate::stage::RunFolder;
 use glam::DVec3;
 use hingecast_articulate::PassRecord;
@@ -242,11 +243,6 @@ fn time(out: &mut String, run: &RunFolder) {
         escape(&run.record.version),
         escape(&run.record.recording.display().to_string())
     );
-}
-
-/// Text as HTML shows it.
-pub fn escape(text: &str) -> String {
-    text.replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;").replace('"', "&quot;")
 }
 
 #[cfg(test)]

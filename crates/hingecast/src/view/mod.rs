@@ -1,6 +1,7 @@
 //! One page in which a twin is taken by its handles: no network, any browser. Made of `web/` (`make web`).
 
 use crate::artifacts::TwinFile;
+use crate::escape::escape;
 use crate::failure::{Failure, Result};
 use crate::stage::read_json;
 use base64::Engine as _;
@@ -38,7 +39,7 @@ pub fn write(twin: &Path, out: &Path) -> Result<()> {
     said["front"] = serde_json::json!(front(&checked).to_array());
     // Inside a script element nothing may close it.
     let data = serde_json::to_string(&said).expect("plain data").replace("</", "<\\/");
-    let title = crate::report::html::escape(&checked.name);
+    let title = escape(&checked.name);
     // The twin last: a name that looks like a mark stays one.
     let page = PAGE.replacen("<!--TITLE-->", &title, 1).replacen("<!--GLB-->", &STANDARD.encode(bytes), 1).replacen(
         "<!--TWIN-->",
