@@ -79,7 +79,7 @@ fn is_stages(stage: &str, path: &Path) -> bool {
         "splat" => &["gaussians.ply", "extent.json", "placed.json", "fit.json", CHECKPOINT],
         "joints" => &["joints.json"],
         "twin" => &["simulator.json"],
-        "report" => &["index.html"],
+        "report" => &["index.html", "view.html"],
         "prepare" => &["prepare.json", "masks.png"],
         _ => &[],
     };
