@@ -28,8 +28,9 @@ pub struct Config {
     pub most: usize,
 }
 
-/// Cells that a surface is cut into at most, before they are joined.
+/// Cells that a surface is cut into at most, before they are joined; fewer where few pieces are asked.
 const CELLS: usize = 160;
+const CELLS_OF_A_PIECE: usize = 7;
 /// Share of a piece that may lie farther outside than it may reach.
 const OUTSIDE: f64 = 0.01;
 /// Share of the whole that is too small to cut for.
@@ -88,12 +89,13 @@ fn pieces(mesh: &TriMesh, config: &Config) -> Option<Vec<Convex>> {
     let bounds = Bounds { room, most: config.most.max(1), whole };
     let mut open = vec![(bounds.outside(&first.hull, true), first)];
     let mut done: Vec<Convex> = Vec::new();
+    let cells = CELLS.min(CELLS_OF_A_PIECE * bounds.most);
     let mut cut = 0;
     // The worst first.
     while let Some(k) = (0..open.len()).max_by(|&a, &b| open[a].0.total_cmp(&open[b].0)) {
         let (outside, cell) = open.swap_remove(k);
         cut += 1;
-        let enough = outside <= bounds.may_hold(&cell.hull) || done.len() + open.len() + 1 >= CELLS || cut > 3 * CELLS;
+        let enough = outside <= bounds.may_hold(&cell.hull) || done.len() + open.len() + 1 >= cells || cut > 3 * cells;
         match if enough { None } else { cuts::best(&cell, &bounds.room) } {
             Some(sides) => {
                 open.extend(sides.into_iter().flatten().map(|side| (bounds.outside(&side.hull, true), side)));
