@@ -21,7 +21,7 @@ FUZZ_SECONDS ?= 60
 TORTURE_FLAGS ?=
 DENY := third_party/cargo-deny/bin/cargo-deny
 
-.PHONY: help setup build demo test fmt circles deny clippy doc tests advisories fuzz torture bench web clean
+.PHONY: help setup build demo test fmt circles page deny clippy doc tests advisories fuzz torture bench web clean
 
 help:
 	@echo 'make demo    record a sample object (OBJECT=$(OBJECT)), build its twin, write the report'
@@ -33,7 +33,7 @@ help:
 	@echo 'make web     the page of `hingecast view` out of web/ (needs npm); the result is checked in'
 	@echo 'make clean   forget what was built; recordings and runs stay'
 	@echo
-	@echo 'one check alone: make fmt | circles | deny | clippy | doc | tests; make advisories asks the network for known holes'
+	@echo 'one check alone: make fmt | circles | page | deny | clippy | doc | tests; make advisories asks the network for known holes'
 
 # Says what is missing and how to get it; fetches MuJoCo once.
 setup:
@@ -50,6 +50,7 @@ demo: build
 test: setup
 	@$(MAKE) --no-print-directory fmt
 	@$(MAKE) --no-print-directory circles
+	@$(MAKE) --no-print-directory page
 	@$(MAKE) --no-print-directory deny
 	@$(MAKE) --no-print-directory clippy
 	@$(MAKE) --no-print-directory doc
@@ -62,6 +63,9 @@ fmt:
 # No file imports in a circle.
 circles:
 	python3 scripts/import_circles.py
+
+# The page of `hingecast view` is made of web/ as it is.
+page:
 	python3 scripts/page_is_current.py
 
 # The page of `hingecast view`, from web/; needs node and npm. What it writes is checked in.

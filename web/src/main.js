@@ -43,18 +43,11 @@ async function start() {
   const surfaces = [];
   view.nodes.forEach((node) => {
     const own = (o) => {
-      if (o.isMesh) surfaces.push(o);
+      // The mesh may be the link itself, which others hang on: its material hides, not it.
+      if (o.isMesh) surfaces.push(o.material);
       o.children.filter((c) => c.userData.part === undefined && !view.hulls.includes(c)).forEach(own);
     };
     own(node);
-  });
-  // A link's own mesh may be its node, which its children hang on: its material hides, not the node.
-  surfaces.forEach((o, k) => {
-    const material = o.material;
-    surfaces[k] = {
-      get visible() { return material.visible; },
-      set visible(on) { material.visible = on; },
-    };
   });
 
   function all(values) {

@@ -1,6 +1,7 @@
 //! Which convex pieces are boxes: simulators are faster and steadier with a box than with its mesh.
 
-use glam::{DMat3, DQuat, DVec3, Vec3};
+use crate::xml::xyz;
+use glam::{DMat3, DQuat, DVec3, EulerRot, Vec3};
 use hingecast_geom::TriMesh;
 
 /// A box, in the frame of the mesh it was.
@@ -12,6 +13,15 @@ pub struct Cuboid {
     pub half: DVec3,
     /// Frame of the mesh from the box's own; as little turned as can be.
     pub rot: DQuat,
+}
+
+impl Cuboid {
+    /// Its edges, its middle from `origin` on, and roll, pitch and yaw, radians, as URDF and SDFormat write
+    /// them.
+    pub(crate) fn words(&self, origin: DVec3) -> [String; 3] {
+        let (yaw, pitch, roll) = self.rot.to_euler(EulerRot::ZYX);
+        [2.0 * self.half, self.centre - origin, DVec3::new(roll, pitch, yaw)].map(xyz)
+    }
 }
 
 /// Corners may be off by this share of the diagonal.
@@ -59,7 +69,7 @@ mod tests {
     #[test]
     fn a_turned_box_is_found_in_any_order_and_a_wedge_is_not() {
         let (lo, hi) = (Vec3::new(-0.1, -0.02, -0.3), Vec3::new(0.1, 0.02, 0.3));
-        let rot = DQuat::from_euler(glam::EulerRot::ZYX, 0.3, -0.2, 0.1);
+        let rot = DQuat::from_euler(EulerRot::ZYX, 0.3, -0.2, 0.1);
         let mut mesh = TriMesh::cuboid(lo, hi);
         mesh.vertices.iter_mut().for_each(|v| *v = (rot * v.as_dvec3()).as_vec3() + Vec3::ONE);
         mesh.vertices.swap(0, 6);

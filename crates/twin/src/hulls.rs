@@ -15,7 +15,11 @@ pub fn decompose(mesh: &TriMesh, config: &pieces::Config) -> (Vec<TriMesh>, usiz
     if let Some(whole) = convex(mesh) {
         return (vec![whole], 0);
     }
-    let mut pieces = pieces::decompose(mesh, config);
+    let mut pieces = quietly(|| pieces::decompose(mesh, config)).unwrap_or_default();
+    if pieces.is_empty() {
+        // Of what cannot be cut, the hull of the whole.
+        pieces.extend(hull_of(&mesh.vertices));
+    }
     let total = pieces.len();
     let thinnest = 1e-3 * (hi - lo).length();
     pieces.retain(|h| usable(h, thinnest));
@@ -34,17 +38,27 @@ pub fn convex(mesh: &TriMesh) -> Option<TriMesh> {
     if !(volume > 0.0) || mesh.open_edges() != 0 {
         return None;
     }
-    let points: Vec<Vector> = mesh.vertices.iter().map(|v| Vector::new(v.x, v.y, v.z)).collect();
-    let (vertices, faces) = try_convex_hull(&points).ok()?;
-    let vertices = vertices.into_iter().map(|p| Vec3::new(p.x, p.y, p.z)).collect();
-    let hull = TriMesh { vertices, faces, colors: Vec::new() };
+    let hull = hull_of(&mesh.vertices)?;
     let (lo, hi) = mesh.bounds()?;
     let alike = volume >= CONVEX * hull.mass_integrals().volume;
     (alike && hull.vertices.len() <= MOST_CORNERS && usable(&hull, 1e-3 * (hi - lo).length())).then_some(hull)
 }
 
+/// Points as parry takes them.
+pub(crate) fn vectors(points: &[Vec3]) -> Vec<Vector> {
+    points.iter().map(|v| Vector::new(v.x, v.y, v.z)).collect()
+}
+
+/// The convex hull of some points, unless they lie in a plane. (On some, parry panics.)
+pub(crate) fn hull_of(points: &[Vec3]) -> Option<TriMesh> {
+    let points = vectors(points);
+    let (vertices, faces) = quietly(|| try_convex_hull(&points).ok()).flatten()?;
+    let vertices = vertices.into_iter().map(|p| Vec3::new(p.x, p.y, p.z)).collect();
+    Some(TriMesh { vertices, faces, colors: Vec::new() })
+}
+
 /// What `work` answers, or nothing if it panics, which is then not printed either.
-pub(crate) fn quietly<T>(work: impl FnOnce() -> T) -> Option<T> {
+fn quietly<T>(work: impl FnOnce() -> T) -> Option<T> {
     thread_local!(static CATCHING: Cell<bool> = const { Cell::new(false) });
     static HOOK: Once = Once::new();
     HOOK.call_once(|| {
@@ -55,9 +69,9 @@ pub(crate) fn quietly<T>(work: impl FnOnce() -> T) -> Option<T> {
             }
         }));
     });
-    CATCHING.set(true);
+    let outer = CATCHING.replace(true);
     let answer = std::panic::catch_unwind(AssertUnwindSafe(work)).ok();
-    CATCHING.set(false);
+    CATCHING.set(outer);
     answer
 }
 

@@ -1,7 +1,7 @@
 //! MJCF text of a twin: the same links and joints as the URDF, for MuJoCo and for robosuite.
 
 use crate::link::{armature, damping, hull_file, link_origin, mean_color, texture_file, touching, visual_file};
-use crate::xml::{escape, xyz};
+use crate::xml::{escape, wxyz, xyz};
 use crate::{Twin, cuboid};
 use glam::{DQuat, DVec3};
 use hingecast_geom::JointKind;
@@ -75,15 +75,7 @@ pub fn for_robosuite(twin: &Twin) -> String {
     let (lo, hi) = if lo.cmple(hi).all() { (lo, hi) } else { (DVec3::ZERO, DVec3::ZERO) };
     let foot = ((lo + hi) / 2.0).with_z(lo.z);
     let _ = writeln!(out, "  <worldbody>\n    <body>\n      <body name=\"object\">");
-    let _ = writeln!(
-        out,
-        "        <body name=\"upright\" pos=\"{}\" quat=\"{:.9} {:.9} {:.9} {:.9}\">",
-        xyz(-foot),
-        upright.w,
-        upright.x,
-        upright.y,
-        upright.z
-    );
+    let _ = writeln!(out, "        <body name=\"upright\" pos=\"{}\" quat=\"{}\">", xyz(-foot), wxyz(upright));
     for root in roots(twin) {
         body(twin, root, DVec3::ZERO, 5, Reader::Robosuite, &mut out);
     }
@@ -179,11 +171,7 @@ fn body(twin: &Twin, part: usize, parent_origin: DVec3, depth: usize, reader: Re
         let shape = match cuboid::of(hull) {
             Some(c) => {
                 let [size, pos] = [c.half, c.centre - origin].map(xyz);
-                let q = c.rot;
-                format!(
-                    "type=\"box\" size=\"{size}\" pos=\"{pos}\" quat=\"{:.9} {:.9} {:.9} {:.9}\"",
-                    q.w, q.x, q.y, q.z
-                )
+                format!("type=\"box\" size=\"{size}\" pos=\"{pos}\" quat=\"{}\"", wxyz(c.rot))
             }
             None => format!("type=\"mesh\" mesh=\"hull_{part}_{k}\""),
         };

@@ -3,7 +3,7 @@
 use crate::link::{damping, hull_file, link_origin, mean_color, visual_file};
 use crate::xml::{escape, xyz};
 use crate::{PartModel, Twin, cuboid};
-use glam::{DVec3, EulerRot};
+use glam::DVec3;
 use hingecast_geom::{Joint, JointKind};
 use std::fmt::Write as _;
 
@@ -50,29 +50,23 @@ fn link(i: usize, part: &PartModel, origin: DVec3, out: &mut String) {
         let [r, g, b] = mean_color(&part.mesh);
         format!("<material><diffuse>{r:.4} {g:.4} {b:.4} 1</diffuse></material>")
     };
-    let _ = writeln!(
-        out,
-        "    <visual name=\"visual\"><geometry>{}</geometry>{material}</visual>",
-        mesh(&visual_file(i), false)
-    );
+    let _ =
+        writeln!(out, "    <visual name=\"visual\"><geometry>{}</geometry>{material}</visual>", mesh(&visual_file(i)));
     for (k, hull) in part.hulls.iter().enumerate() {
         let shape = match cuboid::of(hull) {
             Some(c) => {
-                let (yaw, pitch, roll) = c.rot.to_euler(EulerRot::ZYX);
-                let [size, at, rpy] = [2.0 * c.half, c.centre - origin, DVec3::new(roll, pitch, yaw)].map(xyz);
+                let [size, at, rpy] = c.words(origin);
                 format!("<pose>{at} {rpy}</pose><geometry><box><size>{size}</size></box></geometry>")
             }
-            None => format!("<geometry>{}</geometry>", mesh(&hull_file(i, k), true)),
+            None => format!("<geometry>{}</geometry>", mesh(&hull_file(i, k))),
         };
         let _ = writeln!(out, "    <collision name=\"hull_{k}\">{shape}</collision>");
     }
     out.push_str("  </link>\n");
 }
 
-/// Drake takes no mesh for collision that does not say that it is convex.
-fn mesh(file: &str, convex: bool) -> String {
-    let convex = if convex { "<drake:declare_convex xmlns:drake=\"http://drake.mit.edu\"/>" } else { "" };
-    format!("<mesh><uri>meshes/{file}</uri>{convex}</mesh>")
+fn mesh(file: &str) -> String {
+    format!("<mesh><uri>meshes/{file}</uri></mesh>")
 }
 
 fn joint(twin: &Twin, id: usize, joint: &Joint, out: &mut String) {

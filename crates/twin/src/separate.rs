@@ -6,6 +6,7 @@
 //! leaves the most. (The minimal translation alone cuts a thin lid through its thickness where its
 //! rim sinks in.) What loses nearly everything is dropped.
 
+use crate::hulls::{hull_of, usable, vectors};
 use glam::{Mat3, Vec3};
 use hingecast_geom::{Pose, TriMesh};
 use parry3d::math::{Pose as ParryPose, Vector};
@@ -35,7 +36,7 @@ impl Piece {
 }
 
 fn piece(hull: &TriMesh) -> Option<Piece> {
-    let points: Vec<Vector> = hull.vertices.iter().map(|v| Vector::new(v.x, v.y, v.z)).collect();
+    let points = vectors(&hull.vertices);
     let (lo, hi) = hull.bounds()?;
     let mut normals: Vec<Vec3> = Vec::new();
     for f in &hull.faces {
@@ -106,7 +107,7 @@ fn clear_of(hull: &TriMesh, still: &[Piece], motions: &[Pose], clearance: f32) -
         }
     }
     let (lo, hi) = hull.bounds()?;
-    crate::hulls::usable(&hull, 1e-3 * (hi - lo).length()).then_some(hull)
+    usable(&hull, 1e-3 * (hi - lo).length()).then_some(hull)
 }
 
 fn parry_rotation(pose: &Pose) -> parry3d::math::Rotation {
@@ -135,10 +136,7 @@ fn clip(hull: &TriMesh, normal: Vec3, offset: f32) -> Option<TriMesh> {
             }
         }
     }
-    let points: Vec<Vector> = points.iter().map(|v| Vector::new(v.x, v.y, v.z)).collect();
-    let (vertices, faces) = parry3d::transformation::try_convex_hull(&points).ok()?;
-    let vertices = vertices.into_iter().map(|p| Vec3::new(p.x, p.y, p.z)).collect();
-    Some(TriMesh { vertices, faces, colors: Vec::new() })
+    hull_of(&points)
 }
 
 #[cfg(test)]

@@ -4,7 +4,6 @@
 use crate::link::{damping, hull_file, link_origin, mean_color, visual_file};
 use crate::xml::{escape, xyz};
 use crate::{Twin, cuboid};
-use glam::{DVec3, EulerRot};
 use hingecast_geom::JointKind;
 use std::fmt::Write as _;
 
@@ -49,8 +48,7 @@ pub fn to_string(twin: &Twin) -> String {
         for (k, hull) in part.hulls.iter().enumerate() {
             let shape = match cuboid::of(hull) {
                 Some(c) => {
-                    let (yaw, pitch, roll) = c.rot.to_euler(EulerRot::ZYX);
-                    let [size, at, rpy] = [2.0 * c.half, c.centre - origin, DVec3::new(roll, pitch, yaw)].map(xyz);
+                    let [size, at, rpy] = c.words(origin);
                     format!("<origin xyz=\"{at}\" rpy=\"{rpy}\"/><geometry><box size=\"{size}\"/></geometry>")
                 }
                 None => format!("<geometry><mesh filename=\"{}\"/></geometry>", path(&hull_file(i, k))),

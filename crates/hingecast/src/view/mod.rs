@@ -37,8 +37,8 @@ pub fn write(twin: &Path, out: &Path) -> Result<()> {
     }
     said["collision"] = serde_json::json!(pieces);
     said["front"] = serde_json::json!(front(&checked).to_array());
-    // Inside a script element nothing may close it.
-    let data = serde_json::to_string(&said).expect("plain data").replace("</", "<\\/");
+    // Inside a script element no name may close it, or open a comment.
+    let data = serde_json::to_string(&said).expect("plain data").replace('<', "\\u003c");
     let title = escape(&checked.name);
     // The twin last: a name that looks like a mark stays one.
     let page = PAGE.replacen("<!--TITLE-->", &title, 1).replacen("<!--GLB-->", &STANDARD.encode(bytes), 1).replacen(
@@ -46,6 +46,9 @@ pub fn write(twin: &Path, out: &Path) -> Result<()> {
         &data,
         1,
     );
+    if let Some(folder) = out.parent() {
+        std::fs::create_dir_all(folder).map_err(Failure::io(folder))?;
+    }
     write_whole(out, page.as_bytes()).map_err(Failure::io(out))
 }
 

@@ -13,11 +13,10 @@ const SKIN: f32 = 0.5;
 const FACING: f32 = 0.7;
 
 /// What lies in a box.
-#[derive(Clone)]
 pub struct Cell {
     /// Corners of the box.
-    pub lo: Vec3,
-    pub hi: Vec3,
+    lo: Vec3,
+    hi: Vec3,
     /// The surface, cut at the box.
     pub soup: Vec<Triangle>,
     /// Its corners, and those of the box that are in the solid.

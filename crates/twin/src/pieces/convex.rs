@@ -1,13 +1,11 @@
 //! Convex hulls, and which points are worth one.
 
 use super::{Bounds, OUTSIDE};
+use crate::hulls::hull_of;
 use glam::Vec3;
 use hingecast_geom::TriMesh;
-use parry3d::math::Vector;
-use parry3d::transformation::try_convex_hull;
 
 /// A convex mesh with its planes.
-#[derive(Clone)]
 pub struct Convex {
     pub mesh: TriMesh,
     pub volume: f64,
@@ -80,7 +78,7 @@ impl Convex {
         let area = 2.0 * (size.x * size.y + size.y * size.z + size.z * size.x);
         let inset = ((volume - self.volume) as f32 / area).min(bounds.room.reach);
         let lean = Self::of(TriMesh::cuboid(self.lo + inset, self.hi - inset))?;
-        (bounds.outside(&lean, true) <= OUTSIDE * lean.volume).then_some(lean)
+        (bounds.outside(&lean) <= OUTSIDE * lean.volume).then_some(lean)
     }
 
     /// A hull of fewer of its corners, of which the others stand out by no more than `by`.
@@ -111,11 +109,7 @@ pub fn hull(points: &[Vec3]) -> Option<Convex> {
     if points.len() < 4 {
         return None;
     }
-    let points: Vec<Vector> = points.iter().map(|v| Vector::new(v.x, v.y, v.z)).collect();
-    // On some points parry's hull panics.
-    let (vertices, faces) = crate::hulls::quietly(|| try_convex_hull(&points).ok()).flatten()?;
-    let vertices = vertices.into_iter().map(|p| Vec3::new(p.x, p.y, p.z)).collect();
-    Convex::of(TriMesh { vertices, faces, colors: Vec::new() })
+    Convex::of(hull_of(points)?)
 }
 
 /// The hull of two pieces whose boxes are no farther apart than `apart`.

@@ -49,12 +49,14 @@ struct Bounds {
 }
 
 impl Bounds {
-    /// What a piece holds of the outside, beyond its reach: a volume, counted no further than
-    /// what it may hold if not `all`.
-    fn outside(&self, piece: &Convex, all: bool) -> f64 {
-        let place = f64::from(self.room.cell).powi(3);
-        let most = if all { usize::MAX } else { (self.may_hold(piece) / place) as usize + 1 };
-        place * piece.holds(&self.room.outside, most) as f64
+    /// Volume of a place of the room.
+    fn place(&self) -> f64 {
+        f64::from(self.room.cell).powi(3)
+    }
+
+    /// What a piece holds of the outside, beyond its reach: a volume.
+    fn outside(&self, piece: &Convex) -> f64 {
+        self.place() * piece.holds(&self.room.outside, usize::MAX) as f64
     }
 
     fn may_hold(&self, piece: &Convex) -> f64 {
@@ -62,7 +64,8 @@ impl Bounds {
     }
 
     fn fits(&self, piece: &Convex) -> bool {
-        self.outside(piece, false) <= self.may_hold(piece)
+        let most = (self.may_hold(piece) / self.place()) as usize;
+        piece.holds(&self.room.outside, most + 1) <= most
     }
 }
 
@@ -85,9 +88,9 @@ pub fn decompose(mesh: &TriMesh, config: &Config) -> Vec<TriMesh> {
 fn pieces(mesh: &TriMesh, config: &Config) -> Option<Vec<Convex>> {
     let room = Room::around(mesh, config.reach)?;
     let first = Cell::whole(mesh, &room)?;
-    let whole = mesh.mass_integrals().volume.max(room.volume());
+    let whole = mesh.mass_integrals().volume.max(room.volume);
     let bounds = Bounds { room, most: config.most.max(1), whole };
-    let mut open = vec![(bounds.outside(&first.hull, true), first)];
+    let mut open = vec![(bounds.outside(&first.hull), first)];
     let mut done: Vec<Convex> = Vec::new();
     let cells = CELLS.min(CELLS_OF_A_PIECE * bounds.most);
     let mut cut = 0;
@@ -98,7 +101,7 @@ fn pieces(mesh: &TriMesh, config: &Config) -> Option<Vec<Convex>> {
         let enough = outside <= bounds.may_hold(&cell.hull) || done.len() + open.len() + 1 >= cells || cut > 3 * cells;
         match if enough { None } else { cuts::best(&cell, &bounds.room) } {
             Some(sides) => {
-                open.extend(sides.into_iter().flatten().map(|side| (bounds.outside(&side.hull, true), side)));
+                open.extend(sides.into_iter().flatten().map(|side| (bounds.outside(&side.hull), side)));
             }
             None => done.push(cell.hull),
         }

@@ -1,5 +1,6 @@
 //! Where pieces may not reach: what lies outside a surface, farther from it than they may.
 
+use crate::hulls::vectors;
 use glam::Vec3;
 use hingecast_geom::TriMesh;
 use parry3d::math::Vector;
@@ -21,10 +22,10 @@ pub struct Room {
     dims: [usize; 3],
     /// How far beyond the surface a piece may be, same unit.
     pub reach: f32,
-    /// In the solid, or on its surface.
-    solid: Vec<bool>,
     /// In the solid, a cell from its surface.
     deep: Vec<bool>,
+    /// Half of what is solid, unit of the mesh cubed: a bound from below for what is not closed.
+    pub volume: f64,
     /// Places outside, a little farther from the surface than pieces may reach, in order of z.
     pub outside: Vec<Vec3>,
 }
@@ -35,7 +36,7 @@ impl Room {
         let (lo, hi) = mesh.bounds()?;
         let longest = (hi - lo).max_element();
         let cells = (longest / reach).clamp(CELLS[0], CELLS[1]) as u32;
-        let points: Vec<Vector> = mesh.vertices.iter().map(|v| Vector::new(v.x, v.y, v.z)).collect();
+        let points = vectors(&mesh.vertices);
         let fill = FillMode::FloodFill { detect_cavities: false };
         let set: VoxelSet = VoxelizedVolume::voxelize(&points, &mesh.faces, cells, fill, false).into();
         let cell = set.scale;
@@ -51,24 +52,25 @@ impl Room {
             cell,
             dims,
             reach,
-            solid: vec![false; dims.iter().product()],
-            deep: Vec::new(),
+            deep: vec![false; dims.iter().product()],
+            volume: 0.5 * f64::from(cell).powi(3) * set.voxels().len() as f64,
             outside: Vec::new(),
         };
-        let mut near = room.solid.clone();
+        // On the surface, then near it; on it or in the solid.
+        let mut near = room.deep.clone();
+        let mut solid = room.deep.clone();
         for v in set.voxels() {
             let i: [usize; 3] =
                 std::array::from_fn(|k| ([v.coords.x, v.coords.y, v.coords.z][k] as i64 - first[k]) as usize);
             let i = room.index(i);
-            (room.solid[i], near[i]) = (true, v.is_on_surface);
+            (solid[i], near[i], room.deep[i]) = (true, v.is_on_surface, !v.is_on_surface);
         }
-        room.deep = room.solid.iter().zip(&near).map(|(solid, near)| *solid && !near).collect();
         room.spread(&mut near, steps);
         let surface = shape::TriMesh::new(points, mesh.faces.clone()).ok()?;
         let layer = reach..reach + LAYER * cell;
         room.outside = (0..near.len())
             .into_par_iter()
-            .filter(|&i| near[i] && !room.solid[i])
+            .filter(|&i| near[i] && !solid[i])
             .map(|i| room.place(i))
             .filter(|x| {
                 let p = Vector::new(x.x, x.y, x.z);
@@ -77,11 +79,6 @@ impl Room {
             })
             .collect();
         Some(room)
-    }
-
-    /// Half of what is solid: a bound from below for what is not closed.
-    pub fn volume(&self) -> f64 {
-        0.5 * f64::from(self.cell).powi(3) * self.solid.iter().filter(|s| **s).count() as f64
     }
 
     fn index(&self, [x, y, z]: [usize; 3]) -> usize {
